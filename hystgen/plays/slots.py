@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,6 +55,11 @@ class StepState(Struct):
     sought: Flag  # a solution has been found since the plays followed
     bits: UInt32  # status of the last answer
     status: UInt32
+
+
+def firsts(lengths: Iterable[int]) -> Counts:
+    """Where lists of these lengths begin in a row of all, and where the last one ends."""
+    return np.cumsum([0, *lengths]).astype(np.int64)
 
 
 @jit(inline=True)

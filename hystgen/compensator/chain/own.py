@@ -22,7 +22,7 @@ from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants, OwnBlock
 from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
-from hystgen.plays.slots import Counts, Reals
+from hystgen.plays.slots import Counts, Reals, firsts
 
 Glue = tuple[Answer, Answer, Answer]
 """The functions that an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
@@ -360,9 +360,9 @@ def _adds_up(one: Linear, seconds: float) -> bool:
 def build(every: Sequence[Linear], reals: Any) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
     return OwnTables(
-        np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
+        firsts(len(each.numbers) for each in every),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
-        np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
+        firsts(len(each.settled) for each in every),
         np.zeros(len(every), dtype=np.int64),
     )
 

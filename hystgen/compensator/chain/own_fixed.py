@@ -24,6 +24,7 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.own import Instance
 from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
+from hystgen.plays.slots import firsts
 
 Row = tuple[tuple[int, int], int, int]
 """The members of a `FixedNumber`."""
@@ -184,9 +185,9 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
 def build(rows: Sequence[Formats]) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
     return OwnTables(
-        np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
+        firsts(len(each.table) for each in rows),
         FixedNumber.of([number for each in rows for number in each.table]),
-        np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
+        firsts(len(each.linear.settled) for each in rows),
         np.array([each.bits for each in rows], dtype=np.int64),
     )
 

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Scalar, jit
-from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
+from hystgen.basics.jit import Answer, Moving, Scalar, Telling, jit
+from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
@@ -202,15 +202,9 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     piece = about.reals([each.tolist() for curve in curves for each in curve], "travels of the ageing")
     return AgeingTables(
         AgeingNumbers.of([(*row[:3], *n, *row[3:]) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
-        np.cumsum([0, *counts]).astype(np.int64),
+        firsts(counts),
         AgeingPiece.of(piece, piece.dtype),
     )
-
-
-def constants(t: AgeingTables) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
 
 
 class UnevenAgeing:
@@ -232,16 +226,23 @@ class UnevenAgeing:
 
 
 @jit
-def ageing_gain(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
-    """The gain at a travel; past the last piece it stays constant."""
-    low = t.first[j]
-    high = t.first[j + 1]
+def piece_at(first: Counts, begin: NumberArray, j: int, travel: Scalar) -> int:
+    """The piece of the gain of block j at a travel."""
+    low = first[j]
+    high = first[j + 1]
     while high - low > 1:
         middle = (low + high) // 2
-        if travel >= t.piece.begin[middle]:
+        if travel >= begin[middle]:
             low = middle
         else:
             high = middle
+    return low
+
+
+@jit
+def ageing_gain(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
+    """The gain at a travel; past the last piece it stays constant."""
+    low = piece_at(t.first, t.piece.begin, j, travel)
     share = (travel - t.piece.begin[low]) * t.piece.inverse_length[low]
     if share > t.block.one[j]:
         share = t.block.one[j]
@@ -262,18 +263,6 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -
     s.gain[j] = ageing_gain(t, j, inside)
     s.inverse[j] = t.block.one[j] / s.gain[j]
     return bool(inside != travel)
-
-
-@jit
-def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
-    """Return to the state of the parameter file: nothing has been travelled."""
-    ageing_set_travel(t, s, j, zero(t.block.last[j]))
-
-
-@jit
-def ageing_travelled(s: AgeingState, j: int) -> Scalar:
-    """The travel."""
-    return s.high[j]
 
 
 @jit
@@ -323,12 +312,30 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:
     return s.gain[j] * x
 
 
+def verbs(
+    state: type[Struct], absorb: Answer, solve: Answer, move: Moving, set_gain: Telling, set_travel: Telling
+) -> Verbs:
+    """The verbs of ageing from its functions in an arithmetic."""
+
+    @jit
+    def reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+        """Return to the state of the parameter file: nothing has been travelled."""
+        set_travel(t, s, j, zero(t.block.last[j]))
+
+    @jit
+    def travelled(s: AgeingState, j: int) -> Scalar:
+        """The travel."""
+        return s.high[j]
+
+    return Verbs(
+        memory_of(state), absorb=absorb, solve=solve, reset=reset, move=move,
+        set_gain=set_gain, set_travel=set_travel, travelled=travelled,
+    )
+
+
 ARITHMETIC = Realized(
-    Verbs(
-        memory_of(AgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
-        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
-    ),
-    constants, tables, kinds=(KIND,),
+    verbs(AgeingState, ageing_absorb, ageing_solve, ageing_move, ageing_set, ageing_set_travel),
+    numbered(KIND, 5, 1), tables, kinds=(KIND,),
 )
 
 PART = ChainPart(

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -172,11 +172,6 @@ class CreepMemory(NamedTuple):
     term: CreepTermState
 
 
-def firsts(blocks: Sequence[CreepNumbers]) -> Counts:
-    """Where the states of each block begin, and those of the last one end."""
-    return np.cumsum([0, *(len(one.terms) for one in blocks)]).astype(np.int64)
-
-
 def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
     """The tables of several blocks in floating point; `reals`: converts named numbers to the arithmetic."""
     given = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
@@ -184,15 +179,9 @@ def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> 
     terms = reals(np.concatenate([np.empty((0, 2)), *(shares(one.terms) for one in blocks)]), "creep")
     return CreepTables(
         CreepTable.of([(*row, len(one.terms)) for row, one in zip(rows, blocks, strict=True)], rows.dtype),
-        firsts(blocks),
+        firsts(len(one.terms) for one in blocks),
         CreepTerm.of(terms, terms.dtype),
     )
-
-
-def constants(t: CreepTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (1 + 2 * int(row["n"]), 1), t.term[first : first + row["n"]])
 
 
 @jit
@@ -237,7 +226,7 @@ def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), numbered(KIND, 1, 1, 2),
     lambda blocks, about: tables(blocks, about.reals), kinds=(KIND,),
 )
 
@@ -272,7 +261,9 @@ class UnevenCreep(Block):
         return float(FUNCTIONS[verb](self.table, self.state, 0, x))
 
 
-FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}
+FUNCTIONS: dict[str, Answer] = {
+    "rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb,
+}
 
 PART = ChainPart(
     "creep", "creep", Place.LINEAR, called("creep"),

@@ -8,7 +8,7 @@ from hystgen.basics.jit import Answer, Moving, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Kind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import zero
 
@@ -52,11 +52,6 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
     change = effect.change if isinstance(effect, CurvedDrift) else 0.0
     block = CARRY_SAMPLES * seconds
     return seconds, block, CARRY_SAMPLES, effect.rate, 0.5 * change, farthest, 1.0, float(ahead)
-
-
-def constants(t: ClockNumbers) -> list[Constants]:
-    """The numbers of a model's clock."""
-    return [Constants(KIND, row, (5, 0)) for row in t]
 
 
 @jit
@@ -121,7 +116,7 @@ def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurrounding
 
 
 ARITHMETIC = Realized(
-    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,)
+    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), numbered(KIND, 5), tables, kinds=(KIND,)
 )
 
 PART = ChainPart(

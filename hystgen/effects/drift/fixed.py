@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Kind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import zero
 
@@ -104,11 +104,6 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     return high
 
 
-def constants(t: FixedClockNumbers) -> list[Constants]:
-    """The numbers of a model's clock."""
-    return [Constants(KIND, row, (3, 0)) for row in t]
-
-
 # ---------------------------------------------------------------- clock_fixed.c
 
 
@@ -152,6 +147,6 @@ def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: flo
 
 
 ARITHMETIC = Realized(
-    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), constants,
+    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), numbered(KIND, 3),
     lambda clocks, _: FixedClockNumbers.of([one.table for one in clocks]), formats, kinds=(KIND,),
 )

@@ -8,7 +8,7 @@ with the motion. Only the forward operator has it: the zeros of a second-order s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Kind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import zero
@@ -121,12 +121,6 @@ def tables(modes: Sequence[ModeNumbers], about: FloatSurroundings) -> ModeTable:
     return ModeTable.of(rows, rows.dtype)
 
 
-def constants(t: ModeTable) -> Iterator[Constants]:
-    """The numbers of each mode."""
-    for row in t:
-        yield Constants(KIND, row, (6, 0))
-
-
 @jit
 def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
@@ -148,7 +142,7 @@ def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
     return x + s.off[j]
 
 
-ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants, tables, kinds=(KIND,))
+ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(KIND, 6), tables, kinds=(KIND,))
 
 PART = ChainPart(
     "mode", "resonance", Place.LINEAR, called("resonance", lambda effect: effect.block is None),

@@ -7,14 +7,13 @@ the sample rate that is a small factor, with 31 bits of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Factor, Struct, UInt8, memory_of
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import ModeNumbers, ModeState
@@ -38,12 +37,6 @@ class FixedModeTable(Struct):
 
 
 KIND = replace(compensator.KIND, table=FixedModeTable)
-
-
-def constants(t: FixedModeTable) -> Iterator[Constants]:
-    """The numbers of each mode."""
-    for row in t:
-        yield Constants(KIND, row, (12, 0))
 
 
 def largest_state(one: ModeNumbers, size: float) -> float:
@@ -128,7 +121,7 @@ def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants,
+    Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(KIND, 12),
     lambda modes, _: FixedModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
     kinds=(KIND,),

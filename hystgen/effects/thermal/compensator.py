@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.jit import N, Scalar, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Constants, Kind, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 # ---------------------------------------------------------------- gain.c
 
@@ -61,12 +61,6 @@ class GainState(Struct):
 
 
 KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
-
-
-def constants(t: GainNumbers) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    for row in t:
-        yield Constants(KIND, row, (1, 1))
 
 
 @dataclass(frozen=True)
@@ -272,11 +266,6 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
     return [(2 * i + 1) * half for i in range(FRICTION_PLAYS)]
 
 
-def firsts(rows: Sequence[Sequence[Any]]) -> Counts:
-    """Where the thresholds of each block begin, and those of the last one end."""
-    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
-
-
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
     """Final rise per unit of heat in each step: of the change of the drive's signed square, or of the rubbing plays'
     moves, each times its threshold as an odd multiple of the first."""
@@ -402,15 +391,9 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     return HeatTables(
         HeatNumbers.of([(*row[:-2], n, *row[-2:]) for row, n in zip(rows, turns, strict=True)], rows.dtype),
         FrictionTable.of([(len(each),) for each in widths]),
-        firsts(widths),
+        firsts(map(len, widths)),
         FrictionPlay.of(play, play.dtype),
     )
-
-
-def heat_constants(t: HeatTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row in t.block:
-        yield Constants(HEAT_KIND, row, (7 + 2 * int(row["turns"]), 1))
 
 
 @jit
@@ -425,7 +408,7 @@ def heat_reset(t: HeatTables, s: HeatMemory, j: int) -> None:
 
 
 @jit
-def heat_way(before: Scalar, v: Scalar) -> Scalar:
+def heat_way(before: N, v: N) -> N:
     """The move of the drive's signed square."""
     way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
     return way if way >= zero(v) else -way
@@ -464,11 +447,11 @@ def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # n
 
 # ---------------------------------------------------------------- friction.c
 
-def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
-    """The rubbing plays of each block; None where none rub."""
+def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
+    """The rubbing plays of each block, `each` with so many products; None where none rub."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])
-        yield Constants(FRICTION_KIND, row, (n, 0), t.play[first : first + n]) if n else None
+        yield Constants(kind, row, (each * n, 0), t.play[first : first + n]) if n else None
 
 
 @jit
@@ -540,11 +523,11 @@ class UnevenHeat:
 
 ARITHMETIC = Realized(
     Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, tables, kinds=(KIND,),
+    numbered(KIND, 1, 1), tables, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
     Verbs(memory_of(HeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
+    numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 
 GAIN_PART = ChainPart(

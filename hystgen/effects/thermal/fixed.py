@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
@@ -32,10 +33,11 @@ from hystgen.effects.thermal.compensator import (
     FrictionTable,
     GainState,
     Warm,
+    heat_way,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain linear in a temperature: one product."""
@@ -63,11 +65,6 @@ class FixedGainTable(Struct):
 
 
 KIND = replace(floating.KIND, table=FixedGainTable)
-
-
-def constants(t: FixedGainTable) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    yield from (Constants(KIND, row, (2, 2)) for row in t)
 
 
 def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
@@ -290,15 +287,9 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
     return FixedHeatTables(
         FixedHeatTable.of([one.table for one in rows]),
         FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
-        floating.firsts([one.thresholds for one in rows]),
+        firsts(len(one.thresholds) for one in rows),
         FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
-
-
-def heat_constants(t: FixedHeatTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row in t.block:
-        yield Constants(HEAT_KIND, row, (12 + 2 * int(row["turns"]), 2))
 
 
 @jit
@@ -309,13 +300,6 @@ def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa:
     s.block.inverse[j] = ONE
     s.block.offset[j] = zero(s.block.rise[j])
     s.friction.begun[j] = 0
-
-
-@jit
-def heat_way(before: int, v: int) -> int:
-    """The move of the drive's signed square."""
-    way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
-    return way if way >= 0 else -way
 
 
 @jit
@@ -355,13 +339,6 @@ def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: int) -> int: 
 STATE_BITS = 31
 """Bits of a rubbing play, without its sign: a drive has 15 or 31 of them with it."""
 
-def friction_constants(t: FixedHeatTables) -> Iterator[Constants | None]:
-    """The rubbing plays of each block; None where none rub."""
-    for row, first in zip(t.friction, t.first, strict=False):
-        n = int(row["n"])
-        yield Constants(FRICTION_KIND, row, (2 * n, 0), t.play[first : first + n]) if n else None
-
-
 @jit
 def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> int:
     """As in floating point."""
@@ -391,9 +368,10 @@ def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v
 
 ARITHMETIC = Realized(
     Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, made, formats, kinds=(KIND,),
+    numbered(KIND, 2, 2), made, formats, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
     Verbs(memory_of(FixedHeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND), friction_constants,
+    numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
+    functools.partial(floating.friction_constants, kind=FRICTION_KIND, each=2),
 )
