@@ -125,7 +125,7 @@ def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]
 
 
 def answers(
-    t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
+    t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
     code, state = operations(t, inverse), new_state(t, inverse)

@@ -73,7 +73,7 @@ def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable
     products, `absorb` takes `each` more for each row, and two for each Newton step for the reciprocal of a gain."""
 
     def constants(t: Any) -> Iterator[Constants]:
-        for j, row in enumerate(getattr(t, "block", t)):
+        for j, row in enumerate(t if isinstance(t, Struct) else t.block):
             rows = getattr(t, kind.rows.name)[t.first[j] : t.first[j + 1]] if kind.rows else ()
             turns = int(row["turns"]) if "turns" in row.dtype.names else 0
             yield Constants(kind, row, (absorb + each * len(rows) + 2 * turns, solve), rows)

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import Answer, Moving, Scalar, Telling
 from hystgen.effects.base import Array, Block, Effect, Place
@@ -298,7 +298,7 @@ class Surroundings:
 class FloatSurroundings(Surroundings):
     """The same in floating point: `reals` converts named numbers to the arithmetic, which rounds by `roundoff`."""
 
-    reals: Callable[[Any, str], Any]
+    reals: Callable[[ArrayLike, str], NDArray[Any]]
     roundoff: float
 
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
@@ -83,7 +83,7 @@ def build(
     largest = float(np.finfo(dtype).max) / 16
     static, parts = chain.cascade, Parts.of(chain.effects)
 
-    def reals(values: Any, what: str) -> NDArray[Any]:
+    def reals(values: ArrayLike, what: str) -> NDArray[Any]:
         found = np.array(values, dtype=np.float64)
         if found.size and not np.max(np.abs(found)) <= largest:
             message = f"{what} reach {np.max(np.abs(found)):.3g}, too large for {arithmetic}"

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.basics.jit import N
 from hystgen.basics.structures import Int64, Real, Struct, UInt8
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
@@ -323,7 +324,7 @@ HELD_CODES = 3
 two ahead of it, and rounding that drive to a code adds half of one."""
 
 
-def hold(rounded: Any, dither: Any, turning: bool) -> Any:
+def hold(rounded: N, dither: N, turning: bool) -> N:
     """Largest move back of the drive in front of two branches that does not count: from `rounded` computation, and from
     drives that differ from those asked for."""
     return rounded + (HELD_CODES if turning else 1) * dither

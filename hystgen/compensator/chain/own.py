@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.effects import own
@@ -259,7 +259,7 @@ class Rounded:
     __sub__ = __add__
 
 
-def _apply(effect: Effect, verb: str, *given: Any) -> Any:
+def _apply(effect: Effect, verb: str, *given: object) -> Any:
     assert effect.block is not None
     return getattr(effect.block, verb)(*given)
 
@@ -357,7 +357,7 @@ def _adds_up(one: Linear, seconds: float) -> bool:
     return True
 
 
-def build(every: Sequence[Linear], reals: Any) -> OwnTables:
+def build(every: Sequence[Linear], reals: Callable[[ArrayLike, str], Reals]) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
     return OwnTables(
         firsts(len(each.numbers) for each in every),
@@ -396,7 +396,7 @@ def passed(t: OwnTables, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  as in fi
 # ---------------------------------------------------------------- as a part of the chain
 
 
-def memory(t: OwnTables, dtype: Any) -> Reals:
+def memory(t: OwnTables, dtype: DTypeLike) -> Reals:
     """Memory (m,) of all blocks on one side of the plays."""
     return np.zeros(t.place[-1], dtype)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
@@ -149,7 +150,7 @@ class _Trace:
         def signal(size: float) -> _Traced:
             return _Traced(0.0, 0.0, most).made(size * 2.0**bits, 0.0)
 
-        def state() -> Any:
+        def state() -> NDArray[np.object_]:
             return np.array([signal(size) for size in (self.given * self.linear.sizes()).tolist()], dtype=object)
 
         given, asked = signal(self.given), signal(self.asked)

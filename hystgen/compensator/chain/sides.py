@@ -6,12 +6,12 @@ time-invariant, so their order makes no difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 from hystgen.basics.jit import Answer, Limiting, Moving, Scalar, Telling, jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.parts import AHEAD, BEHIND, PARTS, SENT
+from hystgen.compensator.chain.parts import PARTS
 from hystgen.effects.part import ChainPart, Verbs
 from hystgen.plays.slots import Counts
 
@@ -38,20 +38,6 @@ class BlockMemory(Protocol):
     def blocks(self) -> tuple[object, ...]: ...
     @property
     def counts(self) -> Counts: ...
-
-
-class Sides(NamedTuple):
-    """Verbs of all blocks of a model, as functions of tables, state and a number."""
-
-    sent_rest: Answer
-    sent_absorb: Answer
-    drive_rest: Answer
-    drive_absorb: Answer
-    drive_solve: Answer
-    output_rest: Answer
-    output_absorb: Answer
-    output_resting: Answer
-    output_solve: Answer
 
 
 def _then(first: Answer, k: int, verb: Answer) -> Answer:
@@ -92,10 +78,10 @@ def _nothing(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:  # noqa: ARG0
     return x
 
 
-def sides_of(every: Sequence[Verbs]) -> Sides:
-    """The sides of a chain, from the verbs of all its parts."""
+def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> Iterator[Answer]:
+    """Verbs of all blocks on one side, as functions of tables, state and a number, from the verbs of all parts."""
 
-    def through(side: Sequence[ChainPart], verb: str) -> Answer:
+    def through(verb: str) -> Answer:
         back = verb in ("resting", "solve")
         places = [PARTS.index(part) for part in (reversed(side) if back else side)]
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
@@ -109,11 +95,7 @@ def sides_of(every: Sequence[Verbs]) -> Sides:
 
         return call
 
-    return Sides(
-        *(through(SENT, verb) for verb in ("rest", "absorb")),
-        *(through(AHEAD, verb) for verb in ("rest", "absorb", "solve")),
-        *(through(BEHIND, verb) for verb in ("rest", "absorb", "resting", "solve")),
-    )
+    return map(through, verbs)
 
 
 def _all(every: Sequence[Verbs], verb: str, and_then: Callable[[F, int, F], F], nothing: F) -> F:

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, Limiting, Scalar, Telling, jit
+from hystgen.basics.jit import Answer, Limiting, Moving, Scalar, Telling, jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
-from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
 from hystgen.compensator.chain.preview import PreviewLine, preview_put, preview_repeat
-from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
+from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
@@ -141,7 +141,6 @@ def made_of(
     own blocks in front of the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
-    temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
     clock: Any = every[CLOCK]  # which has all of these
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
     travelled_by = every[AGED].travelled
@@ -157,11 +156,10 @@ def made_of(
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
-    side = sides_of(every)
-    sent_rest, sent_absorb = side.sent_rest, side.sent_absorb
-    drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
-    output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
-    output_side_resting, output_side_solve = side.output_resting, side.output_solve
+    sent_rest, sent_absorb = side_of(every, SENT, "rest", "absorb")
+    drive_side_rest, drive_side_absorb, drive_side_solve = side_of(every, AHEAD, "rest", "absorb", "solve")
+    output_side_rest, output_side_absorb = side_of(every, BEHIND, "rest", "absorb")
+    output_side_resting, output_side_solve = side_of(every, BEHIND, "resting", "solve")
 
     @jit(inline=True)
     def displacement(t: ChainTables, s: ChainState, y: Scalar) -> Scalar:
@@ -507,29 +505,22 @@ def made_of(
         more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.own.output[0]))
         put_offset(t, s, s.own.offset[0] + more)
 
-    @jit
-    def set_temperature(t: ChainTables, s: ChainState, degrees: Scalar) -> None:
-        """Set the temperature."""
-        if not finite(t, degrees):
-            s.plays.step.status[0] |= HELD
-        elif temperature_set(t, s, degrees):
-            s.plays.step.status[0] |= LIMITED_SETTING
+    def setting(put: Telling) -> Moving:
+        """A call that sets a number of the blocks by `put`."""
 
-    @jit
-    def set_gain(t: ChainTables, s: ChainState, gain: Scalar) -> None:
-        """Set a gain that replaces the one that follows the travel."""
-        if not finite(t, gain):
-            s.plays.step.status[0] |= HELD
-        elif gain_set(t, s, gain):
-            s.plays.step.status[0] |= LIMITED_SETTING
+        @jit
+        def set_number(t: ChainTables, s: ChainState, x: Scalar) -> None:
+            """Set it, within its limits."""
+            if not finite(t, x):
+                s.plays.step.status[0] |= HELD
+            elif put(t, s, x):
+                s.plays.step.status[0] |= LIMITED_SETTING
 
-    @jit
-    def set_travel(t: ChainTables, s: ChainState, travel: Scalar) -> None:
-        """Set the distance travelled."""
-        if not finite(t, travel):
-            s.plays.step.status[0] |= HELD
-        elif travel_set(t, s, travel):
-            s.plays.step.status[0] |= LIMITED_SETTING
+        return set_number
+
+    set_temperature, set_gain, set_travel = (
+        setting(told(every, f"set_{what}")) for what in ("temperature", "gain", "travel")
+    )
 
     @jit
     def start_at(t: ChainTables, s: ChainState, after: int) -> None:

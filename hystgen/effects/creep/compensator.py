@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, memory_of
@@ -172,7 +172,7 @@ class CreepMemory(NamedTuple):
     term: CreepTermState
 
 
-def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
+def tables(blocks: Sequence[CreepNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]]) -> CreepTables:
     """The tables of several blocks in floating point; `reals`: converts named numbers to the arithmetic."""
     given = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
     rows = reals(given, "constants of the creep")

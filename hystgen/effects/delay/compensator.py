@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import Answer, Scalar, jit
@@ -94,7 +95,7 @@ def fixed_delayed(t: DelayTables, line: Waiting) -> Scalar:
     return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])
 
 
-def memory(t: DelayTables, dtype: Any) -> Waiting:
+def memory(t: DelayTables, dtype: DTypeLike) -> Waiting:
     """Memory of the delay of a model."""
     return Waiting(np.zeros(t.samples, dtype), np.zeros(1, np.int64))
 
@@ -117,7 +118,7 @@ def verbs(delayed: Answer) -> Verbs:
     return Verbs(memory, rest, absorb)
 
 
-def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], NDArray[Any]]) -> DelayTables:
     """The tables of a model's delays, which add up to one; `share`: converts a share to the arithmetic."""
     waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
@@ -133,7 +134,7 @@ FIXED_ARITHMETIC = Realized(
 )
 
 
-def problems(_: Any, at: Setting) -> Iterator[str]:
+def problems(_: object, at: Setting) -> Iterator[str]:
     """Why the forward operator cannot keep the drives that wait."""
     delay = math.fsum(each.dead_time for each in at.listed)
     if at.operator != "inverse" and delay > MOST_SAMPLES * at.seconds:

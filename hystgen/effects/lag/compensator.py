@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import N, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
@@ -220,7 +220,7 @@ class LagMemory(NamedTuple):
     inverted: ExactState
 
 
-def tables(lags: Sequence[LagNumbers], reals: Callable[[Any, str], Any], braked: int = 0) -> LagTables:
+def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]], braked: int = 0) -> LagTables:
     """The tables of several lags in floating point; `reals`: converts named numbers to the arithmetic."""
     rows = reals([(one.rate, one.second, one.late, one.inverse) for one in lags], "constants of the lag")
     return LagTables(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Flag, Int32, Int64, Struct
@@ -14,7 +15,7 @@ from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepS
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
-Kink = tuple[Any, Any, int, int]
+Kink = tuple[int, int, int, int]
 """`hystgen_kink_t`: output and input along the present move, plays that follow from there on, corners that hold
 the others."""
 
@@ -40,7 +41,7 @@ class FixedMemory(NamedTuple):
     corner: FixedCorner  # (n)
 
 
-def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
+def new_fixed_memory(plays: int, dtype: DTypeLike = np.int64) -> FixedMemory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return FixedMemory(here, undo, StepState.zeros(1, dtype), FixedCorner.zeros(max(plays, 1), dtype))

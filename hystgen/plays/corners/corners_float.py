@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from numpy.typing import DTypeLike
 
 from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, TwoReals
@@ -87,7 +89,7 @@ class Memory(NamedTuple):
     corner: Corner  # (n + 1)
 
 
-def new_memory(plays: int, dtype: Any) -> Memory:
+def new_memory(plays: int, dtype: DTypeLike) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return Memory(here, undo, PlaysState.zeros(1, dtype), StepState.zeros(1, dtype), Corner.zeros(plays + 1, dtype))
