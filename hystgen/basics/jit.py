@@ -45,9 +45,9 @@ N = TypeVar("N", int, float)
 """A number in the arithmetic of another one."""
 
 Answer: TypeAlias = Callable[..., Scalar]
-Limiting: TypeAlias = Callable[..., tuple[Scalar, int]]
-Moving: TypeAlias = Callable[..., None]
-Telling: TypeAlias = Callable[..., bool]
+LimitedAnswer: TypeAlias = Callable[..., tuple[Scalar, int]]
+Action: TypeAlias = Callable[..., None]
+Check: TypeAlias = Callable[..., bool]
 """Functions of tables, memory and numbers, by what they return: a number, one and whether it had to be limited,
 nothing, or yes and no. Tables and memory differ from block to block, so callers cannot name them."""
 

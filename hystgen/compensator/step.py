@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import Answer, Limiting, Moving, N, Scalar, Telling, jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, N, Scalar, jit
 from hystgen.compensator.layout import FixedTables, Limited, Tables, clamp_drive, inverse_clamp
 from hystgen.plays.loop import State, loop_absorb, loop_rest, loop_start
 from hystgen.plays.slots import (
@@ -52,10 +52,10 @@ class Operations(NamedTuple):
     """The operations on an instance of one operator: `init` sets the start memory, `visit` moves the actuator before
     the next sample, `step` answers a sample, `run` makes a sequence of calls."""
 
-    init: Moving
-    visit: Moving
+    init: Action
+    visit: Action
     step: Answer
-    run: Moving
+    run: Action
 
 
 @jit(inline=True)
@@ -126,13 +126,13 @@ class PlayOperations(NamedTuple):
     """Operations of plays behind a memoryless part, in any chain: `init` and `reset` set a start memory, `arrive` moves
     to a drive, `drive` finds the drive for an input of the plays."""
 
-    init: Moving
-    reset: Moving
+    init: Action
+    reset: Action
     arrive: Answer
     drive: Answer
 
 
-def plays_of(front_forward: Answer, front_inverse: Limiting, output: Answer) -> PlayOperations:
+def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer) -> PlayOperations:
     """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
 
     inverse_choose = choosing(front_inverse)
@@ -197,19 +197,19 @@ class Hooks(NamedTuple):
     """The functions of a chain that a step calls, as functions of tables and memory."""
 
     plays: Callable[..., Stepping]  # the memory of the step itself
-    finite: Telling
-    absorb: Moving
-    shown: Limiting  # the present output, and status bits
-    unread: Moving  # note a reference that is not finite
+    finite: Check
+    absorb: Action
+    shown: LimitedAnswer  # the present output, and status bits
+    unread: Action  # note a reference that is not finite
     held: Answer  # the drive for it
-    stands: Telling  # whether the last answer holds for a reference
+    stands: Check  # whether the last answer holds for a reference
     sought: Answer  # the drive for a limited reference, which may lie beyond its range; sets BITS
     other: Answer  # a call that models without effects do not have
 
 
 def run_of(
-    init: Moving, reset: Moving, step: Answer, commit: Moving, plays: Callable[..., Stepping], other: Answer
-) -> Moving:
+    init: Action, reset: Action, step: Answer, commit: Action, plays: Callable[..., Stepping], other: Answer
+) -> Action:
     """`Operations.run` of any engine."""
 
     @jit
@@ -238,7 +238,7 @@ def run_of(
     return run
 
 
-def corners_of(begin: Moving, visit: Moving, step: Answer, commit: Moving = forward_commit) -> Operations:
+def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forward_commit) -> Operations:
     """The operations of one operator in engine corners without effects, whose memory is only that of the plays; `begin`
     sets the start memory of the parameter file (0), or all plays to 0 (1)."""
 
@@ -266,7 +266,7 @@ def no_other(t: Limited, s: object, call: int, x: Scalar) -> Scalar:  # noqa: AR
     return t.limits[ZERO]
 
 
-def operations_of(inverse: bool, init: Moving, reset: Moving, visit: Moving, hooks: Hooks) -> Operations:
+def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hooks: Hooks) -> Operations:
     """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, absorb, shown, unread, held, stands, sought, other = hooks
 
@@ -334,7 +334,7 @@ def operations_of(inverse: bool, init: Moving, reset: Moving, visit: Moving, hoo
 
 
 def made_of(
-    front_forward: Answer, front_inverse: Limiting, output: Limiting, inverse_solve: Answer, finite: Telling
+    front_forward: Answer, front_inverse: LimitedAnswer, output: LimitedAnswer, inverse_solve: Answer, finite: Check
 ) -> tuple[Operations, Operations]:
     """The operations of the forward operator and the inverse of a chain without blocks, from the functions in which
     arithmetics differ: the memoryless part, the output at the present memory with its status bits, the plays' input for

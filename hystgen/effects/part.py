@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import Answer, Moving, Scalar, Telling
+from hystgen.basics.jit import Action, Answer, Check, Scalar
 from hystgen.effects.base import Array, Block, Effect, Place
 from hystgen.effects.kinds import Constants, Kind
 
@@ -29,7 +29,7 @@ class Led(NamedTuple):
     state: Answer
     solve: Callable[..., tuple[Scalar, Scalar]]
     kept: Answer
-    absorb: Moving
+    absorb: Action
     missed: Answer
     braked: Callable[..., Any]
     halves: int = 0
@@ -80,14 +80,14 @@ class Verbs:
     absorb: Answer | None = None
     resting: Answer | None = None
     solve: Answer | None = None
-    reset: Moving | None = None
-    move: Moving | None = None
-    set_temperature: Telling | None = None
-    set_gain: Telling | None = None
-    set_travel: Telling | None = None
+    reset: Action | None = None
+    move: Action | None = None
+    set_temperature: Check | None = None
+    set_gain: Check | None = None
+    set_travel: Check | None = None
     travelled: Answer | None = None
     added: Answer | None = None
-    lead: Moving | None = None
+    lead: Action | None = None
     ahead: Answer | None = None
     led: Led | None = None
 

@@ -9,23 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
-from hystgen.basics.jit import Answer, Limiting, Moving, Scalar, Telling, jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.parts import PARTS
 from hystgen.effects.part import ChainPart, Verbs
 from hystgen.plays.slots import Counts
 
-F = TypeVar("F", Moving, Telling)
+F = TypeVar("F", Action, Check)
 
 
 class Blocks(NamedTuple):
     """The functions of a chain and its blocks in one arithmetic."""
 
     verbs: Callable[[ChainPart], Verbs]
-    bent: tuple[Answer, Limiting]  # maps of the output: forward, inverse
+    bent: tuple[Answer, LimitedAnswer]  # maps of the output: forward, inverse
     target: Answer  # the output to reach, from the preview's line
-    front: tuple[Answer, Limiting]  # forward, inverse
-    plays: tuple[Moving, Answer, Answer, Answer]  # start, follow, started, inverse input
+    front: tuple[Answer, LimitedAnswer]  # forward, inverse
+    plays: tuple[Action, Answer, Answer, Answer]  # start, follow, started, inverse input
     finer: Answer  # the signal in front of the plays, with bits below their input
     braked: Answer  # the drive in reach that keeps a lag from overshooting
     ramp: Callable[..., tuple[Scalar, Scalar]]  # a slew-limited drive one step later, and its rounding remainder
@@ -106,10 +106,10 @@ def _all(every: Sequence[Verbs], verb: str, and_then: Callable[[F, int, F], F], 
     return nothing
 
 
-def told(every: Sequence[Verbs], verb: str) -> Telling:
+def told(every: Sequence[Verbs], verb: str) -> Check:
     """A verb that takes a number from the caller; it returns whether any block had to limit that number."""
 
-    def and_then(first: Telling, k: int, function: Telling) -> Telling:
+    def and_then(first: Check, k: int, function: Check) -> Check:
         @jit
         def both(t: ChainTables, s: BlockMemory, x: Scalar) -> bool:
             limited = first(t, s, x)
@@ -126,10 +126,10 @@ def told(every: Sequence[Verbs], verb: str) -> Telling:
     return _all(every, verb, and_then, nothing)
 
 
-def resetting(every: Sequence[Verbs]) -> Moving:
+def resetting(every: Sequence[Verbs]) -> Action:
     """Reset all blocks to their values in the parameter file."""
 
-    def and_then(first: Moving, k: int, function: Moving) -> Moving:
+    def and_then(first: Action, k: int, function: Action) -> Action:
         @jit
         def both(t: ChainTables, s: BlockMemory) -> None:
             first(t, s)
@@ -145,10 +145,10 @@ def resetting(every: Sequence[Verbs]) -> Moving:
     return _all(every, "reset", and_then, nothing)
 
 
-def moves(every: Sequence[Verbs]) -> Moving:
+def moves(every: Sequence[Verbs]) -> Action:
     """Pass a move of the drive on to all blocks that see it."""
 
-    def and_then(first: Moving, k: int, function: Moving) -> Moving:
+    def and_then(first: Action, k: int, function: Action) -> Action:
         @jit
         def both(t: ChainTables, s: BlockMemory, before: Scalar, v: Scalar) -> None:
             first(t, s, before, v)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, Limiting, Moving, Scalar, Telling, jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
@@ -124,12 +124,12 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
 class Conversions(NamedTuple):
     """Conversions of an operator's arguments into signals, and of signals into its answers, in one arithmetic."""
 
-    finite: Telling
+    finite: Check
     drive_signal: Answer
     arriving: Answer  # a signal as an input of the plays
     level_signal: Answer
     drive_code: Answer
-    output_code: Limiting  # with status bits
+    output_code: LimitedAnswer  # with status bits
     entered_travel: Answer  # as verification sets it
     shared: Answer  # a share of a signal
 
@@ -505,7 +505,7 @@ def made_of(
         more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.own.output[0]))
         put_offset(t, s, s.own.offset[0] + more)
 
-    def setting(put: Telling) -> Moving:
+    def setting(put: Check) -> Action:
         """A call that sets a number of the blocks by `put`."""
 
         @jit

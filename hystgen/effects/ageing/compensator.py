@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, Moving, Scalar, Telling, jit
+from hystgen.basics.jit import Action, Answer, Check, Scalar, jit
 from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
@@ -313,7 +313,7 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:
 
 
 def verbs(
-    state: type[Struct], absorb: Answer, solve: Answer, move: Moving, set_gain: Telling, set_travel: Telling
+    state: type[Struct], absorb: Answer, solve: Answer, move: Action, set_gain: Check, set_travel: Check
 ) -> Verbs:
     """The verbs of ageing from its functions in an arithmetic."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hystgen.basics.jit import Answer, Moving, Scalar, jit
+from hystgen.basics.jit import Action, Answer, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
@@ -84,7 +84,7 @@ def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Scalar) -> Scalar
     return drift
 
 
-def verbs(memory: Callable[..., object], start: Moving, tick: Moving, drift: Answer) -> Verbs:
+def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Answer) -> Verbs:
     """The verbs of a clock from its functions in an arithmetic."""
 
     @jit
