@@ -13,7 +13,7 @@ from modelfiles import BRAKED, CALM, CHAINS, LED, STEADY
 from mutants import MODELS
 
 from hystgen.emission import interface, module, runtime
-from hystgen.emission.compensator import Compensator
+from hystgen.emission.compensator import EmittedModel
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -122,19 +122,19 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
     return found
 
 
-def _compensator(name: str, arithmetic: str, engine: str) -> Compensator:
+def _compensator(name: str, arithmetic: str, engine: str) -> EmittedModel:
     one = model(name)
     return module.compensator(one.parameters, one.cascade, Options("both", arithmetic, engine, "self-contained"))
 
 
-def _states(one: Compensator) -> list[str]:
+def _states(one: EmittedModel) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
     if one.glue:
         return [one.family.chain_types[1]] * one.variant.chain
     return [one.variant.state]
 
 
-def _blocks(one: Compensator) -> list[str]:
+def _blocks(one: EmittedModel) -> list[str]:
     """The files of blocks, without those of a preview, a delay, a quiet drive and two branches where there are none."""
     if not one.compiled:
         return []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any
 
 from hystgen.basics.jit import jit
 
@@ -61,7 +60,7 @@ def lifted(x: float, bits: int) -> int:
 
 
 @jit
-def times(x: Any, mantissa: Any, shift: Any) -> Any:
+def times(x: int, mantissa: int, shift: int) -> int:
     """x times a factor, rounded to the nearest whole number; for |x| < LARGEST."""
     high = x >> LOW_BITS
     low = x & ((1 << LOW_BITS) - 1)

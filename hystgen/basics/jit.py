@@ -23,7 +23,7 @@ import importlib.util
 import inspect
 import types
 from collections.abc import Callable, Iterator
-from typing import Any, Generic, ParamSpec, TypeVar, overload
+from typing import Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,24 @@ from hystgen.basics import extras
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+Scalar: TypeAlias = float
+"""A number given to a function of any arithmetic: a real, or in fixed point a code, since an `int` is a `float` too.
+Functions for fixed point alone take and give an `int`."""
+
+Element: TypeAlias = int
+"""A number out of an array, in the arithmetic that the array is of. To mypy it is an `int`, which may stand for a code
+and for a real."""
+
+N = TypeVar("N", int, float)
+"""A number in the arithmetic of another one."""
+
+Answer: TypeAlias = Callable[..., Scalar]
+LimitedAnswer: TypeAlias = Callable[..., tuple[Scalar, int]]
+Action: TypeAlias = Callable[..., None]
+Check: TypeAlias = Callable[..., bool]
+"""Functions of tables, memory and numbers, by what they return: a number, one and whether it had to be limited,
+nothing, or yes and no. Tables and memory differ from block to block, so callers cannot name them."""
 
 # Called once, with a message for the user, before the first function missing from the cache is compiled, or runs as
 # Python for want of numba

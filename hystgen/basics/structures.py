@@ -11,27 +11,46 @@ second lag, in Python and in compiled code alike, since numba accepts structured
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Annotated, Any, Protocol, Self, TypeAlias, get_args, get_origin, get_type_hints, overload
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-Numbers: TypeAlias = NDArray[Any]
+from hystgen.basics.jit import Element
 
-Real: TypeAlias = Annotated[Numbers, "real_t"]
-Flag: TypeAlias = Annotated[Numbers, "bool"]
-Int64: TypeAlias = Annotated[Numbers, "int64_t"]
-Int32: TypeAlias = Annotated[Numbers, "int32_t"]
-UInt32: TypeAlias = Annotated[Numbers, "uint32_t"]
-UInt8: TypeAlias = Annotated[Numbers, "uint8_t"]
-Signal: TypeAlias = Annotated[Numbers, "signal_t"]  # a real in floating point, int64_t in fixed point
-Narrow: TypeAlias = Annotated[Numbers, "narrow_t"]  # a real in floating point, int32_t in fixed point
-Number: TypeAlias = Annotated[Numbers, "number_t"]
-Count: TypeAlias = Annotated[Numbers, "uint_least16_t"]
-SmallCount: TypeAlias = Annotated[Numbers, "uint_least8_t"]
-TwoReals: TypeAlias = Annotated[Numbers, "real_t", 2]
-FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
+
+class NumberArray(Protocol):
+    """An array of numbers; which type they have is decided with the arithmetic, when tables and memory are made."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[Any]: ...
+    @overload
+    def __getitem__(self, at: int | tuple[int, int], /) -> Element: ...
+    @overload
+    def __getitem__(self, at: slice | list[int] | tuple[slice, int] | tuple[int, slice], /) -> NDArray[Any]: ...
+    def __setitem__(self, at: int | slice | list[int] | tuple[int, int], number: float | NDArray[Any], /) -> None: ...
+    def __array__(self) -> NDArray[Any]: ...
+    def tolist(self) -> Any: ...
+
+
+Real: TypeAlias = Annotated[NumberArray, "real_t"]
+Flag: TypeAlias = Annotated[NumberArray, "bool"]
+Int64: TypeAlias = Annotated[NumberArray, "int64_t"]
+Int32: TypeAlias = Annotated[NumberArray, "int32_t"]
+UInt32: TypeAlias = Annotated[NumberArray, "uint32_t"]
+UInt8: TypeAlias = Annotated[NumberArray, "uint8_t"]
+Signal: TypeAlias = Annotated[NumberArray, "signal_t"]  # a real in floating point, int64_t in fixed point
+Narrow: TypeAlias = Annotated[NumberArray, "narrow_t"]  # a real in floating point, int32_t in fixed point
+Number: TypeAlias = Annotated[NumberArray, "number_t"]
+Count: TypeAlias = Annotated[NumberArray, "uint_least16_t"]
+SmallCount: TypeAlias = Annotated[NumberArray, "uint_least8_t"]
+TwoReals: TypeAlias = Annotated[NumberArray, "real_t", 2]
+FourInt32: TypeAlias = Annotated[NumberArray, "int32_t", 4]
 
 
 class Struct(np.ndarray[Any, np.dtype[Any]]):

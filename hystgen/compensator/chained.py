@@ -44,7 +44,7 @@ loss of 1 % per decade from half the range on, converge to the last bit in 5 ite
 STANDARD = Compensation()
 
 
-class Actuator(Block):
+class FrontAndPlays(Block):
     """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out.
 
     A move back by at most `slack` does not count.
@@ -207,7 +207,7 @@ class Compensator:
             [block for effect in chain.at(place) if (block := filter_block(effect))]
             for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.actuator = Actuator(chain)
+        self.actuator = FrontAndPlays(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self.parts.slew
         self.rest = 0.0  # rounding remainder of a slew-limited drive: it would add up over millions of steps

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import partial
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.arithmetic import FIXED
 from hystgen.basics.problems import FormatError, Path, counted
@@ -429,7 +429,7 @@ class Builder:
 
         levels = [t * k - q for t, k, q in zip(self.threshold, self.slope, self.lift, strict=False)]
 
-        def whole(values: Sequence[int]) -> Any:
+        def whole(values: Sequence[float]) -> NDArray[np.int64]:
             return np.array(values, dtype=np.int64)
 
         return FixedTables(

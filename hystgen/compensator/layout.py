@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import N, Scalar, jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
@@ -112,7 +112,7 @@ class Limited(Protocol):
 
 
 @jit(inline=True)
-def clamp_drive(t: Limited, v: Any) -> Any:
+def clamp_drive(t: Limited, v: N) -> N:
     """v inside the input range."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]
@@ -122,7 +122,7 @@ def clamp_drive(t: Limited, v: Any) -> Any:
 
 
 @jit(inline=True)
-def inverse_clamp(t: Limited, u: Any) -> Any:
+def inverse_clamp(t: Limited, u: N) -> N:
     """u inside the output range."""
     if u < t.limits[OUTPUT_MIN]:
         return t.limits[OUTPUT_MIN]
@@ -136,10 +136,10 @@ def inverse_clamp(t: Limited, u: Any) -> Any:
 
 def first_moves(
     cascade: StaticModel,
-    limits: tuple[Any, Any],
-    not_above: Callable[[float], tuple[Any, bool]],
-    nearest: Callable[[float], Any],
-) -> tuple[list[Any], list[int]]:
+    limits: tuple[Scalar, Scalar],
+    not_above: Callable[[float], tuple[Scalar, bool]],
+    nearest: Callable[[float], Scalar],
+) -> tuple[list[Scalar], list[int]]:
     """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.
 
     `not_above` gives the largest number of the type that does not exceed a drive, and whether the two are equal. The
@@ -148,7 +148,8 @@ def first_moves(
     direction if staying there counts as descending. The inverse starts at the nearest number, where it may stay.
     """
     low, high = limits
-    applied, ascending = [0, 0, 0, 0], [1, 1, 1, 1]
+    applied: list[Scalar] = [0, 0, 0, 0]
+    ascending = [1, 1, 1, 1]
     if cascade.start_is_defined:
         for j, w in enumerate((float(cascade.pi.start[0]), 0.0)):
             v = float(cascade.front_inverse(w))

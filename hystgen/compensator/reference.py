@@ -19,7 +19,6 @@ from hystgen.compensator import step_fixed, step_float, tables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
-    forward_front,
     inverse,
     inverse_fixed,
     inverse_front,
@@ -55,7 +54,7 @@ class Engines(NamedTuple):
 ENGINES = (
     Engines(
         compensator, step_float.OPERATIONS,
-        ((forward.OPERATIONS, inverse.OPERATIONS), (forward_front.OPERATIONS, inverse_front.OPERATIONS)),
+        ((forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)),
     ),
     Engines(
         curve, step_fixed.OPERATIONS,
@@ -126,7 +125,7 @@ def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]
 
 
 def answers(
-    t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
+    t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
     code, state = operations(t, inverse), new_state(t, inverse)

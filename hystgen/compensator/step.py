@@ -10,10 +10,10 @@ tables.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import jit
-from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, N, Scalar, jit
+from hystgen.compensator.layout import FixedTables, Limited, Tables, clamp_drive, inverse_clamp
 from hystgen.plays.loop import State, loop_absorb, loop_rest, loop_start
 from hystgen.plays.slots import (
     DOMAIN,
@@ -30,28 +30,41 @@ from hystgen.plays.slots import (
     ZERO,
     Bytes,
     Reals,
+    StepState,
 )
 
-Function = Callable[..., Any]
+
+class Stepping(Protocol):
+    """The memory of a step itself, which every engine has."""
+
+    @property
+    def step(self) -> StepState: ...
+
+
+class Branching(Limited, Protocol):
+    """The tables of a memoryless part that may have two branches."""
+
+    @property
+    def branches(self) -> int: ...
 
 
 class Operations(NamedTuple):
     """The operations on an instance of one operator: `init` sets the start memory, `visit` moves the actuator before
     the next sample, `step` answers a sample, `run` makes a sequence of calls."""
 
-    init: Function
-    visit: Function
-    step: Function
-    run: Function
+    init: Action
+    visit: Action
+    step: Answer
+    run: Action
 
 
 @jit(inline=True)
-def forward_commit(t: Any, s: Any, applied: Any) -> None:
+def forward_commit(t: Limited, s: object, applied: Scalar) -> None:
     """Do nothing: the forward operator has absorbed every drive."""
 
 
 @jit(inline=True)
-def inverse_answer(s: State, v: Any) -> Any:
+def inverse_answer(s: Stepping, v: Scalar) -> Scalar:
     """Leave drive v pending and return it."""
     s.step.answer[0] = v
     s.step.pending[0] = v
@@ -61,7 +74,7 @@ def inverse_answer(s: State, v: Any) -> Any:
 
 
 @jit
-def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
+def inverse_fits(t: Limited, s: Stepping, v: Scalar, ascending: int) -> bool:
     """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
     if inside == s.step.drive[0]:
@@ -69,18 +82,60 @@ def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> b
     return bool((inside > s.step.drive[0]) == (ascending != 0))
 
 
+@jit(inline=True)
+def turn_to(s: Stepping, v: Scalar) -> None:
+    """Move the actuator to drive v; the direction of the move picks the branch."""
+    if v > s.step.drive[0]:
+        s.step.ascending[0] = 1
+    elif v < s.step.drive[0]:
+        s.step.ascending[0] = 0
+    s.step.drive[0] = v
+
+
+def choosing(
+    front_inverse: Callable[..., tuple[N, int]]
+) -> Callable[[Branching, Stepping, N, N], tuple[N, int]]:
+    """`inverse_choose` with the inverse of an arithmetic's memoryless part."""
+
+    @jit
+    def inverse_choose(t: Branching, s: Stepping, level: N, w: N) -> tuple[N, int]:
+        """The drive that gives w on the branch of its own move: it tries the branch of the reference's move, then the
+        other one; if neither fits, the drive holds."""
+        if not t.branches:
+            return front_inverse(t, w, 1)
+        up = s.step.ascending[0]
+        if level > s.step.last[0]:
+            up = 1
+        elif level < s.step.last[0]:
+            up = 0
+        v, limited = front_inverse(t, w, up)
+        if inverse_fits(t, s, v, up):
+            return v, limited
+        back = clamp_drive(t, v) - s.step.drive[0]
+        if up == s.step.ascending[0] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+            return s.step.drive[0], limited
+        v, limited = front_inverse(t, w, 1 - up)
+        if inverse_fits(t, s, v, 1 - up):
+            return v, limited
+        return s.step.drive[0], limited
+
+    return inverse_choose
+
+
 class PlayOperations(NamedTuple):
     """Operations of plays behind a memoryless part, in any chain: `init` and `reset` set a start memory, `arrive` moves
     to a drive, `drive` finds the drive for an input of the plays."""
 
-    init: Function
-    reset: Function
-    arrive: Function
-    drive: Function
+    init: Action
+    reset: Action
+    arrive: Answer
+    drive: Answer
 
 
-def plays_of(front_forward: Function, front_inverse: Function, output: Function) -> PlayOperations:
+def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer) -> PlayOperations:
     """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
+
+    inverse_choose = choosing(front_inverse)
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
@@ -114,45 +169,20 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
-    def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
+    def set_drive(t: Tables | FixedTables, s: State, v: Scalar) -> None:
         """Move the actuator to drive v; with two branches, the direction of the move picks one."""
         if t.branches:
-            if v > s.step.drive[0]:
-                s.step.ascending[0] = 1
-            elif v < s.step.drive[0]:
-                s.step.ascending[0] = 0
+            turn_to(s, v)
         s.step.drive[0] = v
 
     @jit(inline=True)
-    def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
+    def arrive(t: Tables | FixedTables, s: State, v: Scalar) -> Scalar:
         """Move the actuator to drive v. Returns the input of the plays."""
         set_drive(t, s, v)
         return front_forward(t, v, s.step.ascending[0])
 
     @jit
-    def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
-        """The drive that gives w on the branch of its own move: it tries the branch of the reference's move, then the
-        other one; if neither fits, the drive holds."""
-        if not t.branches:
-            return front_inverse(t, w, 1)  # type: ignore[no-any-return]
-        up = s.step.ascending[0]
-        if level > s.step.last[0]:
-            up = 1
-        elif level < s.step.last[0]:
-            up = 0
-        v, limited = front_inverse(t, w, up)
-        if inverse_fits(t, s, v, up):
-            return v, limited
-        back = clamp_drive(t, v) - s.step.drive[0]
-        if up == s.step.ascending[0] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
-            return s.step.drive[0], limited
-        v, limited = front_inverse(t, w, 1 - up)
-        if inverse_fits(t, s, v, 1 - up):
-            return v, limited
-        return s.step.drive[0], limited
-
-    @jit
-    def inverse_drive(t: Tables | FixedTables, s: State, level: Any, w: Any) -> Any:
+    def inverse_drive(t: Tables | FixedTables, s: State, level: Scalar, w: Scalar) -> Scalar:
         """The drive that gives w."""
         v, limited = inverse_choose(t, s, level, w)
         s.step.last[0] = level
@@ -166,24 +196,24 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
 class Hooks(NamedTuple):
     """The functions of a chain that a step calls, as functions of tables and memory."""
 
-    plays: Function  # the memory of the step itself
-    finite: Function
-    absorb: Function
-    shown: Function  # the present output, and status bits
-    unread: Function  # note a reference that is not finite
-    held: Function  # the drive for it
-    stands: Function  # whether the last answer holds for a reference
-    sought: Function  # the drive for a limited reference, which may lie beyond its range; sets BITS
-    other: Function  # a call that models without effects do not have
+    plays: Callable[..., Stepping]  # the memory of the step itself
+    finite: Check
+    absorb: Action
+    shown: LimitedAnswer  # the present output, and status bits
+    unread: Action  # note a reference that is not finite
+    held: Answer  # the drive for it
+    stands: Check  # whether the last answer holds for a reference
+    sought: Answer  # the drive for a limited reference, which may lie beyond its range; sets BITS
+    other: Answer  # a call that models without effects do not have
 
 
 def run_of(
-    init: Function, reset: Function, step: Function, commit: Function, plays: Function, other: Function
-) -> Function:
+    init: Action, reset: Action, step: Answer, commit: Action, plays: Callable[..., Stepping], other: Answer
+) -> Action:
     """`Operations.run` of any engine."""
 
     @jit
-    def run(t: Any, s: Any, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+    def run(t: Limited, s: object, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
         """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, also for a reset;
         status[i] is read and cleared, or 0 and left for a later call."""
         m = plays(s).step
@@ -208,13 +238,22 @@ def run_of(
     return run
 
 
-def corners_of(
-    init: Function, reset: Function, visit: Function, step: Function, commit: Function = forward_commit
-) -> Operations:
-    """The operations of one operator in engine corners without effects, whose memory is only that of the plays."""
+def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forward_commit) -> Operations:
+    """The operations of one operator in engine corners without effects, whose memory is only that of the plays; `begin`
+    sets the start memory of the parameter file (0), or all plays to 0 (1)."""
 
     @jit(inline=True)
-    def itself(m: Any) -> Any:
+    def init(t: Limited, m: Stepping) -> None:
+        """Set the start memory of the parameter file."""
+        begin(t, m, 0)
+
+    @jit(inline=True)
+    def reset(t: Limited, m: Stepping) -> None:
+        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        begin(t, m, 1)
+
+    @jit(inline=True)
+    def itself(m: Stepping) -> Stepping:
         """The memory itself."""
         return m
 
@@ -222,17 +261,17 @@ def corners_of(
 
 
 @jit(inline=True)
-def no_other(t: Any, s: Any, call: int, x: Any) -> Any:  # noqa: ARG001  the same call for every chain
+def no_other(t: Limited, s: object, call: int, x: Scalar) -> Scalar:  # noqa: ARG001  the same call for every chain
     """Return 0: a model without effects has no other calls."""
     return t.limits[ZERO]
 
 
-def operations_of(inverse: bool, init: Function, reset: Function, visit: Function, hooks: Hooks) -> Operations:
+def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hooks: Hooks) -> Operations:
     """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
-    def forward_step(t: Any, s: Any, v: Any) -> Any:
+    def forward_step(t: Limited, s: object, v: Scalar) -> Scalar:
         """Answer one sample of the forward operator."""
         m = plays(s)
         if not finite(t, v):
@@ -247,7 +286,7 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         return m.step.answer[0]
 
     @jit
-    def inverse_take(t: Any, s: Any) -> None:
+    def inverse_take(t: Limited, s: object) -> None:
         """Absorb the pending drive."""
         m = plays(s)
         if m.step.has_pending[0]:
@@ -255,7 +294,7 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
             m.step.has_pending[0] = 0
 
     @jit
-    def inverse_step(t: Any, s: Any, u: Any) -> Any:
+    def inverse_step(t: Limited, s: object, u: Scalar) -> Scalar:
         """Answer one sample of the inverse operator."""
         m = plays(s)
         inverse_take(t, s)
@@ -277,7 +316,7 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         return inverse_answer(m, inside)
 
     @jit
-    def inverse_commit(t: Any, s: Any, applied: Any) -> None:
+    def inverse_commit(t: Limited, s: object, applied: Scalar) -> None:
         """Replace the last answer by the drive that was really applied."""
         m = plays(s)
         if not finite(t, applied):
@@ -295,14 +334,14 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
 
 
 def made_of(
-    front_forward: Function, front_inverse: Function, output: Function, inverse_solve: Function, finite: Function
+    front_forward: Answer, front_inverse: LimitedAnswer, output: LimitedAnswer, inverse_solve: Answer, finite: Check
 ) -> tuple[Operations, Operations]:
     """The operations of the forward operator and the inverse of a chain without blocks, from the functions in which
     arithmetics differ: the memoryless part, the output at the present memory with its status bits, the plays' input for
     an output, and whether an argument is finite."""
 
     @jit(inline=True)
-    def level_of(t: Tables | FixedTables, s: State) -> Any:
+    def level_of(t: Tables | FixedTables, s: State) -> Scalar:
         """The output at the present memory; its status is not reported, since this is no step."""
         return output(t, s)[0]
 
@@ -314,12 +353,12 @@ def made_of(
         return s
 
     @jit(inline=True)
-    def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
+    def absorb(t: Tables | FixedTables, s: State, v: Scalar) -> None:
         """Absorb drive v."""
         loop_absorb(t, s, arrive(t, s, v))
 
     @jit
-    def visit(t: Tables | FixedTables, s: State, v: Any) -> None:
+    def visit(t: Tables | FixedTables, s: State, v: Scalar) -> None:
         """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
         s.step.last[0], bits = output(t, s)
@@ -330,12 +369,12 @@ def made_of(
         """Do nothing: there is no line of references."""
 
     @jit(inline=True)
-    def held(t: Tables | FixedTables, s: State) -> Any:  # noqa: ARG001  the same call for every chain
+    def held(t: Tables | FixedTables, s: State) -> Scalar:  # noqa: ARG001  the same call for every chain
         """The last answer again."""
         return s.step.answer[0] if s.step.stepped[0] else s.step.drive[0]
 
     @jit(inline=True)
-    def stands(t: Tables | FixedTables, s: State, u: Any) -> bool:  # noqa: ARG001
+    def stands(t: Tables | FixedTables, s: State, u: Scalar) -> bool:  # noqa: ARG001
         """Whether the last answer holds for reference u; u becomes the last reference."""
         if s.step.repeated[0] and u == s.step.reference[0]:
             return True
@@ -344,7 +383,7 @@ def made_of(
         return False
 
     @jit(inline=True)
-    def sought(t: Tables | FixedTables, s: State, level: Any) -> Any:
+    def sought(t: Tables | FixedTables, s: State, level: Scalar) -> Scalar:
         """The drive for the limited reference `level`."""
         s.step.bits[0] = 0
         return inverse_drive(t, s, level, inverse_solve(t, s, level))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables
 from hystgen.compensator.step import made_of
@@ -14,19 +12,19 @@ from hystgen.plays.slots import FRACTION, OFFSET
 
 
 @jit
-def output(t: FixedTables, s: State) -> tuple[Any, int]:
+def output(t: FixedTables, s: State) -> tuple[int, int]:
     """Output code at the present memory, limited to the type, and its status."""
     return code(t, loop_output(t, s) + t.limits[OFFSET])
 
 
 @jit
-def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
+def inverse_solve(t: FixedTables, s: State, level: int) -> int:
     """Input of the plays that gives output code `level`."""
     return loop_solve(t, s, (level << t.limits[FRACTION]) - t.limits[OFFSET])
 
 
 @jit
-def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  as in floating point
+def finite(t: FixedTables, x: int) -> bool:  # noqa: ARG001  as in floating point
     """True: every code is finite."""
     return True
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.compensator.layout import Tables
 from hystgen.compensator.step import made_of
 from hystgen.front.compensator import front_forward, front_inverse
@@ -13,19 +11,19 @@ from hystgen.plays.slots import OFFSET, REAL_MAX
 
 
 @jit(inline=True)
-def output(t: Tables, s: State) -> tuple[Any, int]:
+def output(t: Tables, s: State) -> tuple[Scalar, int]:
     """Output at the present memory, including the offset, and its status."""
     return loop_output(t, s) + t.limits[OFFSET], 0
 
 
 @jit(inline=True)
-def inverse_solve(t: Tables, s: State, level: Any) -> Any:
+def inverse_solve(t: Tables, s: State, level: Scalar) -> Scalar:
     """Input of the plays that gives output `level`."""
     return loop_solve(t, s, level - t.limits[OFFSET])
 
 
 @jit(inline=True)
-def finite(t: Tables, x: Any) -> bool:
+def finite(t: Tables, x: Scalar) -> bool:
     """Whether x is neither NaN nor infinite."""
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
 

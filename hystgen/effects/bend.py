@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.front.curve import curve
@@ -39,13 +40,14 @@ class Bends(NamedTuple):
 
 
 def bends(
-    pieces: Sequence[Sequence[BendPiece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
+    pieces: Sequence[Sequence[BendPiece]], domain: Sequence[tuple[int, int]], scaled: Sequence[tuple[int, int]],
+    degree: int,
 ) -> Bends:
     """The tables of curves; a curve that is not needed has no pieces."""
     flat = list(itertools.chain.from_iterable(pieces))
     first = [0, *itertools.accumulate(map(len, pieces))][: len(pieces)]
 
-    def whole(values: Any, columns: int = 0) -> Any:
+    def whole(values: ArrayLike, columns: int = 0) -> NDArray[np.int64]:
         found = np.array(values, dtype=np.int64)
         return found.reshape(-1, columns) if columns else found
 
@@ -57,7 +59,7 @@ def bends(
 
 
 @jit
-def bend(t: Bends, which: int, x: Any) -> tuple[Any, int]:
+def bend(t: Bends, which: int, x: int) -> tuple[int, int]:
     """The value of a curve at x, and whether x had to be limited to its ends."""
     argument = nearest(x, t.scaled[which, 0])
     inside = argument

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
 
 from hystgen.basics.jit import jit
 
@@ -42,13 +41,13 @@ def newton_steps(change: float, roundoff: float) -> int:
 
 
 @jit
-def reciprocal(gain: Any) -> Any:
+def reciprocal(gain: int) -> int:
     """1 over a gain."""
     return ((1 << (2 * GAIN_BITS)) + (gain >> 1)) // gain
 
 
 @jit
-def followed(gain: Any, before: Any, turns: Any) -> Any:
+def followed(gain: int, before: int, turns: int) -> int:
     """The reciprocal of a gain that has moved, by Newton steps from the one before."""
     half = 1 << (GAIN_BITS - 1)
     inverse = before

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hystgen.basics.jit import Jit, jit
+from hystgen.basics.jit import Answer, Jit, Scalar, jit
 from hystgen.basics.structures import Struct
 
 VERBS = ("rest", "resting", "solve", "absorb")
@@ -68,6 +68,19 @@ class Constants:
     bits: int = 0
 
 
+def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
+    """What gives the constants of all blocks of a kind from their tables. Their verbs take `absorb` and `solve`
+    products, `absorb` takes `each` more for each row, and two for each Newton step for the reciprocal of a gain."""
+
+    def constants(t: Any) -> Iterator[Constants]:
+        for j, row in enumerate(t if isinstance(t, Struct) else t.block):
+            rows = getattr(t, kind.rows.name)[t.first[j] : t.first[j + 1]] if kind.rows else ()
+            turns = int(row["turns"]) if "turns" in row.dtype.names else 0
+            yield Constants(kind, row, (absorb + each * len(rows) + 2 * turns, solve), rows)
+
+    return constants
+
+
 def product(number: Any, x: Any) -> Any:
     """A number of a block's table times x, in a user's own block; in C it is `hystgen_product(&t->number, x)`."""
     return number * x
@@ -84,12 +97,12 @@ class OwnBlock:
     source: str
     table: tuple[str, ...]
     state: tuple[str, ...]
-    rest: Callable[[Any, Any, Any], Any]
-    resting: Callable[[Any, Any], Any]
-    solve: Callable[[Any, Any, Any], Any]
-    absorb: Callable[[Any, Any, Any], Any]
+    rest: Callable[..., Any]
+    resting: Callable[..., Any]
+    solve: Callable[..., Any]
+    absorb: Callable[..., Any]
 
-    def compiled(self, verb: str, arithmetic: Callable[..., Any]) -> Jit[..., Any]:
+    def compiled(self, verb: str, arithmetic: Answer) -> Jit[..., Scalar]:
         """A function for the bit reference, with the product of an arithmetic in place of `product`."""
         function = getattr(self, verb)
         names = function.__globals__
@@ -104,12 +117,12 @@ class OwnBlock:
         """Number of products in absorb and in solve."""
         return _products(self.absorb), _products(self.solve)
 
-    def verbs(self) -> Iterator[tuple[str, Any]]:
+    def verbs(self) -> Iterator[tuple[str, Answer]]:
         """Names and functions."""
         return ((verb, getattr(self, verb)) for verb in VERBS)
 
 
-def _products(function: Callable[..., Any]) -> int:
+def _products(function: Answer) -> int:
     text = ast.parse(textwrap.dedent(inspect.getsource(function)))
     names = {name for name, value in function.__globals__.items() if value is product}
     called = (node.func for node in ast.walk(text) if isinstance(node, ast.Call))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -142,7 +142,7 @@ class MapTables(NamedTuple):
 
 
 @jit
-def straight(t: MapTables, j: int, x: Any, slope: int) -> Any:
+def straight(t: MapTables, j: int, x: int, slope: int) -> int:
     """x, with another slope beyond the ends."""
     inside = x
     if inside < t.piece[j, LOWER]:
@@ -153,7 +153,7 @@ def straight(t: MapTables, j: int, x: Any, slope: int) -> Any:
 
 
 @jit
-def maps_forward(t: MapTables, x: Any) -> Any:
+def maps_forward(t: MapTables, x: int) -> int:
     """x behind all maps."""
     y = x
     for j in range(len(t.kind)):
@@ -165,7 +165,7 @@ def maps_forward(t: MapTables, x: Any) -> Any:
 
 
 @jit
-def maps_inverse(t: MapTables, y: Any) -> tuple[Any, int]:
+def maps_inverse(t: MapTables, y: int) -> tuple[int, int]:
     """The input of all maps for the output y, and whether no input gives it."""
     x = y
     limited = 0

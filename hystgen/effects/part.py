@@ -11,8 +11,9 @@ from fractions import Fraction
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from hystgen.basics.jit import Action, Answer, Check, Scalar
 from hystgen.effects.base import Array, Block, Effect, Place
 from hystgen.effects.kinds import Constants, Kind
 
@@ -25,12 +26,12 @@ class Led(NamedTuple):
     and the input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in
     fixed point among numbers up to `coarse`."""
 
-    state: Function
-    solve: Function
-    kept: Function
-    absorb: Function
-    missed: Function
-    braked: Function
+    state: Answer
+    solve: Callable[..., tuple[Scalar, Scalar]]
+    kept: Answer
+    absorb: Action
+    missed: Answer
+    braked: Callable[..., Any]
     halves: int = 0
     coarse: int = 0
 
@@ -74,25 +75,25 @@ class Verbs:
     whether the drive has moved. `led`: for a block in front of the plays that may be led.
     """
 
-    memory: Function
-    rest: Function | None = None
-    absorb: Function | None = None
-    resting: Function | None = None
-    solve: Function | None = None
-    reset: Function | None = None
-    move: Function | None = None
-    set_temperature: Function | None = None
-    set_gain: Function | None = None
-    set_travel: Function | None = None
-    travelled: Function | None = None
-    added: Function | None = None
-    lead: Function | None = None
-    ahead: Function | None = None
+    memory: Callable[..., object]
+    rest: Answer | None = None
+    absorb: Answer | None = None
+    resting: Answer | None = None
+    solve: Answer | None = None
+    reset: Action | None = None
+    move: Action | None = None
+    set_temperature: Check | None = None
+    set_gain: Check | None = None
+    set_travel: Check | None = None
+    travelled: Answer | None = None
+    added: Answer | None = None
+    lead: Action | None = None
+    ahead: Answer | None = None
     led: Led | None = None
 
-    def verb(self, name: str) -> Function | None:
+    def verb(self, name: str) -> Answer | None:
         """The function for a verb."""
-        found: Function | None = getattr(self, name)
+        found: Answer | None = getattr(self, name)
         instead = {"rest": self.absorb, "resting": self.solve}
         return found or instead.get(name)
 
@@ -297,7 +298,7 @@ class Surroundings:
 class FloatSurroundings(Surroundings):
     """The same in floating point: `reals` converts named numbers to the arithmetic, which rounds by `roundoff`."""
 
-    reals: Callable[[Any, str], Any]
+    reals: Callable[[ArrayLike, str], NDArray[Any]]
     roundoff: float
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer
+from hystgen.emission.compensator import ConstantTable, Effects, EmittedStage, Field, Form, Glue, Writer
 from hystgen.emission.runtime import template
 from hystgen.emission.text import literal, operand
 from hystgen.plays import slots
@@ -32,7 +32,7 @@ NUMBERS = {
 
 
 @dataclass(frozen=True)
-class Block:
+class NamedBlock:
     """One block of a chain: its constants, and its name within the model."""
 
     constants: Constants
@@ -73,7 +73,7 @@ class Block:
         """The call for the heat that a move of the drive to v generates in rubbing plays."""
         return f"hystgen_friction_move({self.table}, &self->{self.name}, self->{self.fields[1].name}, self->applied, v)"
 
-    def tables(self, writer: Writer) -> list[Table]:
+    def tables(self, writer: Writer) -> list[ConstantTable]:
         """Its table, after the table of its rows if it has one."""
         kind, constants = self.kind, self.constants
         numbers = members(kind.table, constants.table)
@@ -95,17 +95,17 @@ def _written(number: Any) -> str:
     return f"{{{', '.join(map(literal, number))}}}" if isinstance(number, np.ndarray) else literal(number)
 
 
-def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
+def sides(t: ChainTables, operator: str) -> tuple[list[NamedBlock], list[NamedBlock]]:
     """The blocks of an operator: those in front of the plays, from the drive on, and those behind them."""
     from hystgen.compensator.chain import blocks
 
-    found: list[list[Block]] = []
+    found: list[list[NamedBlock]] = []
     for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()
         found.append([])
         for constants in side:
             counts[constants.kind.name] += 1
-            found[-1].append(Block(constants, f"{constants.kind.name}_{counts[constants.kind.name]}"))
+            found[-1].append(NamedBlock(constants, f"{constants.kind.name}_{counts[constants.kind.name]}"))
     return found[0], found[1]
 
 
@@ -159,37 +159,38 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Chain:
+class ChainBlocks:
     """The blocks of a model with effects: for each operator those in front of the plays and those behind; its clock;
     and the plays that rub."""
 
-    sides: Mapping[str, tuple[list[Block], list[Block]]]
-    clocks: list[Block]
-    rubbing: list[Block | None]
+    sides: Mapping[str, tuple[list[NamedBlock], list[NamedBlock]]]
+    clocks: list[NamedBlock]
+    rubbing: list[NamedBlock | None]
 
     @classmethod
-    def of(cls, t: ChainTables, operators: Sequence[str]) -> Chain:
+    def of(cls, t: ChainTables, operators: Sequence[str]) -> ChainBlocks:
         """The blocks of a model."""
         from hystgen.compensator.chain import blocks
 
         rubbing = [
-            Block(constants, f"{constants.kind.name}_{i}") if constants else None
+            NamedBlock(constants, f"{constants.kind.name}_{i}") if constants else None
             for i, constants in enumerate(blocks.rubbing(t), 1)
         ]
-        return cls({op: sides(t, op) for op in operators}, [Block(each, "clock") for each in blocks.clocks(t)], rubbing)
+        clocks = [NamedBlock(each, "clock") for each in blocks.clocks(t)]
+        return cls({op: sides(t, op) for op in operators}, clocks, rubbing)
 
-    def blocks(self, operator: str) -> list[Block]:
+    def blocks(self, operator: str) -> list[NamedBlock]:
         """Every block of an operator."""
         before, after = self.sides[operator]
         return [*before, *after, *(each for each in self.rubbing if each), *self.clocks]
 
 
 def effects(
-    compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage], writer: Writer
+    compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[EmittedStage], writer: Writer
 ) -> Effects:
     """Tables and macros of a model's effects; `behind`: its stages of saturation."""
 
-    t, chain = compiled.tables, Chain.of(compiled.tables, operators)
+    t, chain = compiled.tables, ChainBlocks.of(compiled.tables, operators)
     largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks plus modes
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
@@ -214,11 +215,11 @@ def effects(
     return Effects(compiled, tuple(tables), tuple(each for stage in behind for each in stage.arrays), tuple(constants))
 
 
-def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage]) -> Glue:
+def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[EmittedStage]) -> Glue:
     """The glue of a model with effects."""
     from hystgen.effects.plays import DASHPOT
 
-    t, chain = compiled.tables, Chain.of(compiled.tables, operators)
+    t, chain = compiled.tables, ChainBlocks.of(compiled.tables, operators)
     shape = Shape.of(t, form)
     functions = [
         _functions(op, shape, *chain.sides[op], behind, chain.clocks, chain.rubbing) for op in operators
@@ -246,7 +247,7 @@ _KEPT = "; the rounding remainder of each follows"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
-def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", t.taps
     waiting = 0 if inverse else t.waiting
@@ -288,11 +289,11 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
 def _functions(
     op: str,
     t: Shape,
-    before: Sequence[Block] = (),
-    after: Sequence[Block] = (),
-    behind: Sequence[Stage] = (),
-    clocks: Sequence[Block] = (),
-    rubbing: Sequence[Block | None] = (),
+    before: Sequence[NamedBlock] = (),
+    after: Sequence[NamedBlock] = (),
+    behind: Sequence[EmittedStage] = (),
+    clocks: Sequence[NamedBlock] = (),
+    rubbing: Sequence[NamedBlock | None] = (),
 ) -> str:
     """The functions of one operator that name its blocks."""
     inverse = op == "inverse"
@@ -308,7 +309,7 @@ def _functions(
     from hystgen.compensator.chain.parts import PARTS
 
     moved = {kind.name for part in PARTS if part.floating.verbs.move for kind in part.floating.kinds}
-    kinds: defaultdict[str, list[Block]] = defaultdict(list)
+    kinds: defaultdict[str, list[NamedBlock]] = defaultdict(list)
     for block in after:
         kinds[block.kind.name].append(block)
 

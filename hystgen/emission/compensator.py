@@ -32,7 +32,7 @@ STANDARD = frozenset(["int32_t", "uint32_t", "uint16_t", "uint8_t"])
 
 
 @dataclass(frozen=True)
-class Table:
+class ConstantTable:
     """A constant; `contents`: the types in it, without a run time's prefix, and how many of each it contains."""
 
     name: str
@@ -41,12 +41,12 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Stage:
+class EmittedStage:
     """A memoryless stage: its kind, its tables, the expression for the last table in a call, and the argument through
     which the call reports that the stage limited its input."""
 
     kind: str
-    arrays: tuple[Table, ...]
+    arrays: tuple[ConstantTable, ...]
     table: str
     limited: str = ""
 
@@ -82,39 +82,39 @@ class Writer:
         """A writer for types that the model itself defines."""
         return Writer(self.name, self.name)
 
-    def constant(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> Table:
+    def constant(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> ConstantTable:
         """A constant with these lines between its braces, on one line if it fits, below a comment `words`."""
         return self._table(own, words + constant(self._declared(kind, own, sizes), lines), [(kind, math.prod(sizes))])
 
-    def line(self, kind: str, own: str, values: str, *sizes: int) -> Table:
+    def line(self, kind: str, own: str, values: str, *sizes: int) -> ConstantTable:
         """A constant on one line."""
         text = f"static const {self._declared(kind, own, sizes)} = {{{values}}};\n"
         return self._table(own, text, [(kind, math.prod(sizes))])
 
-    def entries(self, kind: str, own: str, entries: Iterable[str], words: str = "") -> Table:
+    def entries(self, kind: str, own: str, entries: Iterable[str], words: str = "") -> ConstantTable:
         """A structure with these entries, on as few lines as they need."""
         return self.constant(kind, own, filled(entries).splitlines(), words=words)
 
-    def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> Table:
+    def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> ConstantTable:
         """An array of structures, one per line; `last`: text after the last one."""
         *first, final = [f"    {{{row}}}" for row in rows]
         return self.lines(kind, own, [*(f"{row}," for row in first), final + last], *sizes)
 
-    def block(self, kind: str, own: str, entries: Sequence[str]) -> Table:
+    def block(self, kind: str, own: str, entries: Sequence[str]) -> ConstantTable:
         """The table of a block."""
         lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
         return self.lines(kind, own, lines)
 
-    def lines(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> Table:
+    def lines(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> ConstantTable:
         """A constant with these lines between its braces."""
         return self._table(own, words + braces(self._declared(kind, own, sizes), lines), [(kind, math.prod(sizes))])
 
-    def array(self, kind: str, own: str, values: Sequence[Number], words: str = "") -> Table:
+    def array(self, kind: str, own: str, values: Sequence[Number], words: str = "") -> ConstantTable:
         """An array of numbers."""
         text = table(self._typed(kind), f"{self.name}_{own}", values)
         return self._table(own, words + text, [(kind, len(values))])
 
-    def columns(self, kind: str, own: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> Table:
+    def columns(self, kind: str, own: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> ConstantTable:
         """Arrays of numbers in one structure, so compilers reach all of them from one address."""
         text = structure(self._typed(kind), f"{self.name}_{own}", columns)
         return self._table(own, text, [(kind, len(values)) for _, values in columns])
@@ -125,8 +125,8 @@ class Writer:
     def _declared(self, kind: str, own: str, sizes: Sequence[int]) -> str:
         return f"{self._typed(kind)} {self.name}_{own}" + "".join(f"[{size}]" for size in sizes)
 
-    def _table(self, own: str, text: str, contents: Sequence[tuple[str, int]]) -> Table:
-        return Table(f"{self.name}_{own}", text, tuple(contents))
+    def _table(self, own: str, text: str, contents: Sequence[tuple[str, int]]) -> ConstantTable:
+        return ConstantTable(f"{self.name}_{own}", text, tuple(contents))
 
 
 def filled(entries: Iterable[str]) -> str:
@@ -183,12 +183,12 @@ class Numbers:
     drive: tuple[str, str]
     output: tuple[str, str]
     macros: tuple[Macro, ...]
-    plays: tuple[Table, ...]
-    beside: tuple[Table, ...]
+    plays: tuple[ConstantTable, ...]
+    beside: tuple[ConstantTable, ...]
     errors: Errors
     fronts: bool
     envelopes: bool
-    stages: tuple[Stage, ...] = ()
+    stages: tuple[EmittedStage, ...] = ()
     finer: bool = False
     saturates: bool = False
     lsb: tuple[Number, ...] = ()
@@ -206,8 +206,8 @@ class Effects:
     """The C of a model's effects besides its plays: tables, tables of saturation, and macros."""
 
     compiled: Compiled
-    tables: tuple[Table, ...]
-    behind: tuple[Table, ...]
+    tables: tuple[ConstantTable, ...]
+    behind: tuple[ConstantTable, ...]
     macros: tuple[Macro, ...]
 
 
@@ -231,24 +231,24 @@ class Form(ABC):
 
     @abstractmethod
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
+        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
     ) -> Numbers:
         """The numbers of a model with effects, with these stages of saturation behind the plays."""
 
     @abstractmethod
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
+    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
         """The stages of saturation."""
 
     @abstractmethod
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
-    def tap(self, t: ChainTables, writer: Writer) -> Table:
+    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
         """The weights of the references that are summed."""
 
     @abstractmethod
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         """The fractional step of a delay, as tables and macros."""
 
     @abstractmethod
@@ -322,7 +322,9 @@ def truth(x: object) -> str:
     return "true" if x else "false"
 
 
-def pointers(numbers: Tables | FixedTables, places: Sequence[str], writer: Writer, whose: str = "model") -> Table:
+def pointers(
+    numbers: Tables | FixedTables, places: Sequence[str], writer: Writer, whose: str = "model"
+) -> ConstantTable:
     """Pointers to the tables of engine loop."""
     return writer.entries("tables_t", f"{whose}_tables", [*places, str(len(numbers.threshold) - 1)])
 
@@ -334,7 +336,7 @@ def units(parameters: Parameters) -> tuple[str, str]:
     return drive, output
 
 
-def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> Table:
+def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> ConstantTable:
     """The drives of an operator's start memories: these columns, and the direction of the last move."""
     first = 2 * (operator == "inverse")
     rows = (
@@ -391,7 +393,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Units:
+class UnitTexts:
     """Units of drive and output as written in comments, empty if the parameter file has none."""
 
     drive: str
@@ -404,7 +406,7 @@ class Units:
 
 
 @dataclass(frozen=True)
-class Compensator:
+class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain."""
 
     parameters: Parameters
@@ -432,10 +434,10 @@ class Compensator:
         return measured(self.compiled, chain, how)
 
     @property
-    def units(self) -> Units:
+    def units(self) -> UnitTexts:
         """Units of drive and output."""
         units = self.parameters.units
-        return Units(comment_text(units.input), comment_text(units.output))
+        return UnitTexts(comment_text(units.input), comment_text(units.output))
 
     @property
     def calls(self) -> dict[str, list[str]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.emission.compensator import AnyTables, Table
+from hystgen.emission.compensator import AnyTables, ConstantTable
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Family, Member, Piece
 from hystgen.plays import slots
@@ -44,7 +44,7 @@ AVR = Layout(integer=2, pointer=2, packed=True)
 
 
 @dataclass(frozen=True)
-class Memory:
+class MemoryBytes:
     """Bytes of the constant tables and of an instance of each operator; `play`: bytes that each play adds to both."""
 
     tables: int
@@ -64,8 +64,8 @@ class Cost:
     of a step in words and the dearest sample of similar models on each core."""
 
     code: Mapping[str, int]
-    memory: Memory
-    avr: Memory | None
+    memory: MemoryBytes
+    avr: MemoryBytes | None
     worst_case: list[tuple[str, str]]
     dearest: Mapping[str, Mapping[str, engines.Dearest]]
 
@@ -134,7 +134,7 @@ class Data:
 
     family: Family
     types: Sequence[Piece]
-    plays: Sequence[Table]
+    plays: Sequence[ConstantTable]
     constants: Sequence[tuple[str, int]]
 
 
@@ -161,7 +161,7 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
     return Cost(code, memory, avr if known else None, worst, dearest)
 
 
-def selftest_bytes(real: int, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
+def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout) -> tuple[int, int]:
     """Bytes of a self-test's samples, whose numbers take `real` each, and of the instance that its operators use in
     turn."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
@@ -235,14 +235,14 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     return {"forward": forward + stages, "inverse": both + led + stages}
 
 
-def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
+def _memory(n: int, options: Options, data: Data, layout: Layout) -> MemoryBytes:
     lengths = {"HYSTGEN_N_PLAYS": n, "HYSTGEN_CORNERS": data.family.corners(n)}
     known = sizes(data.types, data.family, layout, lengths)
     a_play, _ = known["corner_t" if options.engine == "corners" else data.family.meaning("play_t")]
     of_plays = [each for table in data.plays for each in table.contents]
     instances = [(op, known[f"{op}_t"][0]) for op in options.operators]
     more = _constants(of_plays, known, data.family, n + 1) + a_play * len(instances)
-    return Memory(_constants(data.constants, known, data.family), instances, more)
+    return MemoryBytes(_constants(data.constants, known, data.family), instances, more)
 
 
 def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:

@@ -10,14 +10,14 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.layout import FixedTables
 from hystgen.emission.compensator import (
+    ConstantTable,
     Effects,
+    EmittedStage,
     Errors,
     Field,
     Form,
     Macro,
     Numbers,
-    Stage,
-    Table,
     Writer,
     drives,
     entries,
@@ -47,7 +47,7 @@ RELAXING = COLUMNS[2:]
 """The columns that engine loop has for plays that relax."""
 
 
-class Fixed(Form):
+class FixedForm(Form):
     """Fixed point."""
 
     apart = "HYSTGEN_APART"
@@ -98,7 +98,7 @@ class Fixed(Form):
         )
 
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
+        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
     ) -> Numbers:
 
         compiled, tables, codes = effects.compiled, effects.compiled.tables, effects.compiled.codes
@@ -125,17 +125,17 @@ class Fixed(Form):
             ),
         )
 
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
+    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
         return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         from hystgen.compensator.chain import moving
 
         plays: FixedMovingTables = t.moving
         numbers: list[Macro] = [("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search")]
         if plays.scanned:
             arrays = [
-                writer.line("factor_t", f"relaxing_{name}", _factor(rows[1]))
+                writer.line("factor_t", f"relaxing_{name}", _factor(rows[1, :]))
                 for name, rows in (("late", plays.first), ("kept", plays.second))
             ]
             if inverse:
@@ -203,10 +203,10 @@ class Fixed(Form):
         degrees: float = t.of("gain").reference[0].item() / 2.0**thermal.TEMPERATURE_BITS
         return degrees
 
-    def tap(self, t: ChainTables, writer: Writer) -> Table:
+    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
         return _factors("tap", t.tap, writer)
 
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
@@ -223,7 +223,7 @@ def _factor(pair: Iterable[int]) -> str:
     return entries(pair, "f")[1:-1]
 
 
-def _factors(own: str, rows: Reals, writer: Writer) -> Table:
+def _factors(own: str, rows: Reals, writer: Writer) -> ConstantTable:
     return writer.lines("factor_t", own, [f"    {entries(row, 'f')}," for row in rows], len(rows))
 
 
@@ -271,7 +271,7 @@ def _macros(t: FixedTables) -> list[Macro]:
     ]
 
 
-def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[Table]:
+def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
     """The tables of an engine and the start memory; `chain`: of a model with effects."""
     if options.engine == "corners":
         return _corner_tables(t, options, writer, chain)
@@ -280,14 +280,14 @@ def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> lis
     return [*(writer.array(kind, field, list(getattr(t, field))) for field, kind in columns), *start]
 
 
-def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[Table]:
+def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[ConstantTable]:
     """Pointers to the tables of engine loop, NULL for unread ones, and the ends of the plays' input."""
     read = {field for field, _, both in COLUMNS if both or options.inverse}
     places = [f"{writer.name}_{field}" if field in read else "NULL" for field, _, _ in COLUMNS]
     return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
 
 
-def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[Table]:
+def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[ConstantTable]:
     """Pointers for the inverse of plays that relax."""
     own = [f"{writer.name}_{'relaxing_' * ((field, kind, both) in RELAXING)}{field}" for field, kind, both in COLUMNS]
     wanted = t.moving.scanned and options.inverse
@@ -299,7 +299,7 @@ def _ends(t: FixedTables) -> list[str]:
     return [literal(t.limits[slots.PLAY_MIN] - margin), literal(t.limits[slots.PLAY_MAX] + margin)]
 
 
-def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[Table]:
+def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
     """The tables of engine corners: one curve for both operators, and the contents of a start memory."""
     never = (t.reach[-1], t.way[-1], 0, 0, 1)
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
@@ -316,11 +316,11 @@ def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool
     return [*found, *(drives(t, (t.applied,), operator, writer) for operator in fronts)]
 
 
-def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Table], list[Macro]]:
+def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
     """The curves in use of the memoryless part, forward and for an inverse also back, and their sizes."""
     if not t.fronts:
         return [], []
-    arrays: list[Table] = []
+    arrays: list[ConstantTable] = []
     counts: list[Macro] = [("DEGREE", f"{t.coefficient.shape[1] - 1}u", "of the polynomials of every curve")]
     directions = (("_ascending", 0), ("_descending", 1)) if t.branches else (("", 0),)
     kinds = (("front", FORWARD), ("back", INVERSE)) if options.inverse else (("front", FORWARD),)
@@ -331,15 +331,15 @@ def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Tabl
             arrays += _pieces(t, which, own, writer, words)
             counts.append((f"{own}_PIECES".upper(), f"{t.pieces[which]}u", ""))
             if kind == "back":
-                (low, high), (under, over) = t.domain[which], t.edge[which]
-                ends = [*t.argument[which], low - under, high + over, low, high]
+                (low, high), (under, over) = t.domain[which, :], t.edge[which, :]
+                ends = [*t.argument[which, :], low - under, high + over, low, high]
                 arrays.append(writer.entries("ends_t", f"{own}_ends", map(literal, ends)))
     if options.inverse:
         counts.append(("BELOW", f"{int(t.below[INVERSE])}u", "bits of a curve back below a drive code"))
     return arrays, counts
 
 
-def _pieces(t: FixedTables | Bends, which: int, own: str, writer: Writer, words: str = "") -> list[Table]:
+def _pieces(t: FixedTables | Bends, which: int, own: str, writer: Writer, words: str = "") -> list[ConstantTable]:
     """The tables of a curve's pieces."""
     here = int(t.first[which])
     rows = slice(here, here + int(t.pieces[which]))
@@ -350,11 +350,11 @@ def _pieces(t: FixedTables | Bends, which: int, own: str, writer: Writer, words:
     ]
 
 
-def _names(tables: Sequence[Table]) -> str:
+def _names(tables: Sequence[ConstantTable]) -> str:
     return ", ".join(each.name for each in tables)
 
 
-def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
+def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
     """The curves of bent plays minus the plays themselves."""
     curves = [_pieces(t.bump, k, f"bump_{k + 1}", writer) for k in range(len(t.bump.pieces))]
     rows = [f"{_names(curve)}, {n}" for curve, n in zip(curves, t.bump.pieces, strict=True)]
@@ -365,13 +365,13 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
     ]
 
 
-def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
+def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:
     """A stage of saturation behind the plays."""
     behind, own = t.behind, f"behind_{j + 1}"
     if behind.kind[j] == slots.DEAD_ZONE:
         lower, upper, *over = behind.piece[j]
         row = f"    {literal(lower)}, {literal(upper)}, {entries(over, 'ff')},"
-        return Stage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")
+        return EmittedStage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")
     curves = [
         _pieces(behind.bends, which, f"{own}_{direction}", writer)
         for which, direction in ((2 * j, "there"), (2 * j + 1, "back"))
@@ -379,8 +379,8 @@ def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
     bends: Bends = behind.bends
     rows = [
         f"{_names(curve)},\n     "
-        + entries((*bends.domain[k], bends.pieces[k], bends.coefficient.shape[1] - 1, *bends.scaled[k]))
+        + entries((*bends.domain[k, :], bends.pieces[k], bends.coefficient.shape[1] - 1, *bends.scaled[k, :]))
         for k, curve in enumerate(curves, 2 * j)
     ]
     arrays = (*(text for curve in curves for text in curve), writer.rows("bend_t", own, rows))
-    return Stage("bend", arrays, f"&hystgen_{own}", ", limited")
+    return EmittedStage("bend", arrays, f"&hystgen_{own}", ", limited")

@@ -13,14 +13,14 @@ from hystgen.compensator import float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.layout import Tables
 from hystgen.emission.compensator import (
+    ConstantTable,
     Effects,
+    EmittedStage,
     Errors,
     Field,
     Form,
     Macro,
     Numbers,
-    Stage,
-    Table,
     Writer,
     drives,
     entries,
@@ -48,7 +48,7 @@ DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True),
              ("slope", 1, True), ("inverse_slope", 1, False))
 """Arrays of a dead zone, how many more entries each has than break points, and whether both operators read it."""
 
-class Floating(Form):
+class FloatingForm(Form):
     """Floating point."""
 
     held = "NaN or infinite input: the last answer was held"
@@ -76,7 +76,7 @@ class Floating(Form):
         return _numbers(t, errors, options, writer, chain=False)
 
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
+        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
     ) -> Numbers:
         from hystgen.compensator.chain.bounds import chain_bounds, condition
 
@@ -92,10 +92,10 @@ class Floating(Form):
             envelopes=plays.envelopes or any(one.kind == "envelope" for one in stages),
         )
 
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
+    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
         return [_stage(t.behind, j, f"behind_{j + 1}", options, writer) for j in range(len(t.behind.stage_kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         from hystgen.compensator.chain import moving
 
         plays: MovingTables = t.moving
@@ -136,10 +136,10 @@ class Floating(Form):
 
         return float(t.of("gain").reference[0])
 
-    def tap(self, t: ChainTables, writer: Writer) -> Table:
+    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
         return writer.array("real_t", "tap", list(t.tap))
 
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         return [], [("WAITED", operand(t.of("wait").share[0]), "elapsed part of the step after the oldest sample")]
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
@@ -171,14 +171,14 @@ def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain:
     )
 
 
-def _loop_tables(t: Tables, options: Options, writer: Writer) -> list[Table]:
+def _loop_tables(t: Tables, options: Options, writer: Writer) -> list[ConstantTable]:
     """The tables of engine loop: arrays in one structure, and the start memory."""
     columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or options.inverse]
     start = [writer.array("real_t", "model_start", list(t.start))] * (len(t.start) > 1)
     return [writer.columns("real_t", "play", columns), *start]
 
 
-def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[Table]:
+def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[ConstantTable]:
     """The tables of engine corners, one operator after the other."""
     found = []
     for operator, curve, starts in (
@@ -191,7 +191,7 @@ def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> 
     return found
 
 
-def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer) -> list[Table]:
+def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer) -> list[ConstantTable]:
     """Segments, curve and start memories of one operator."""
     rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
     segments = filled(f"{{{entries(row)}}}" for row in rows).splitlines()
@@ -217,7 +217,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writ
     return [*found, writer.lines("start_t", f"{operator}_start", lines, 2)]
 
 
-def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -> Stage:
+def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -> EmittedStage:
     """A stage of the memoryless part, or of saturation."""
     data = t.stage_data[int(t.stage_first[j]) :]
     if t.stage_kind[j] == slots.TANH:
@@ -230,7 +230,7 @@ def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -
             writer.lines("envelope_t", branch, filled(map(literal, row)).splitlines(), words=words)
             for branch, row in branches.items()
         ]
-        return Stage("envelope", tuple(arrays), place, ", limited")
+        return EmittedStage("envelope", tuple(arrays), place, ", limited")
     n, first = int(t.stage_size[j]), 0
     arrays, places = [], []
     for part, more, both in DEAD_ZONE:
@@ -243,4 +243,4 @@ def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -
             places.append("NULL")
     words = "/* the straight pieces of the dead-zone sum */\n"
     lines = filled([*places, str(n)]).splitlines()
-    return Stage("dead_zone", (*arrays, writer.lines("dead_zone_t", own, lines, words=words)), f"&hystgen_{own}")
+    return EmittedStage("dead_zone", (*arrays, writer.lines("dead_zone_t", own, lines, words=words)), f"&hystgen_{own}")

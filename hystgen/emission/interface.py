@@ -12,7 +12,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
 from hystgen.emission import cost, runtime
-from hystgen.emission.compensator import Compensator, Macro
+from hystgen.emission.compensator import EmittedModel, Macro
 from hystgen.emission.cost import Cost
 from hystgen.emission.options import OPTIONS, Options
 from hystgen.emission.runtime import Piece
@@ -58,13 +58,13 @@ def command(parameters: Parameters, options: Options) -> str:
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
-def conditions(one: Compensator) -> tuple[str, str]:
+def conditions(one: EmittedModel) -> tuple[str, str]:
     """The conditions of NAME_INVERSE_ROUNDING_ERROR in words, on branches and on memory; empty if there is none."""
     branch = "both take the same branch" if one.variant.branches else ""
     return branch, one.numbers.errors.condition or UNSLEWED * one.variant.slew
 
 
-def unbounded(one: Compensator) -> list[str]:
+def unbounded(one: EmittedModel) -> list[str]:
     """A sentence if no bound of the inverse's error is known."""
     if (found := one.measured) is None:
         return []
@@ -79,7 +79,7 @@ def unbounded(one: Compensator) -> list[str]:
     return [said]
 
 
-def reading(one: Compensator) -> list[str]:
+def reading(one: EmittedModel) -> list[str]:
     """How the inverse of a model with effects reads the reference: one sentence for each option."""
     compiled = one.compiled
     if compiled is None or not one.options.inverse:
@@ -123,7 +123,7 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
     ]
 
 
-def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
+def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
     """When and how closely a drive is kept at rest."""
 
     t = compiled.tables
@@ -137,7 +137,7 @@ def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
     ]
 
 
-def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]:
+def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str]:
     """The lines of a header's banner; `notes`: how the inverse reads references, and why it may be of little use."""
     parameters, options = one.parameters, one.options
     about = comment_text(parameters.description)
@@ -179,7 +179,7 @@ def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]
     ]
 
 
-def _model(one: Compensator) -> str:
+def _model(one: EmittedModel) -> str:
     n = one.cascade.pi.n
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.cascade.stages]
     names = dict.fromkeys(effect.name for effect in one.parameters.model.effects)
@@ -208,11 +208,11 @@ def version_number() -> int:
     return 10000 * major + 100 * minor + patch
 
 
-def _defined(one: Compensator, macros: Iterable[Macro]) -> list[str]:
+def _defined(one: EmittedModel, macros: Iterable[Macro]) -> list[str]:
     return [define(f"{one.names.NAME}_{name}", value, comment) for name, value, comment in macros]
 
 
-def typedefs(one: Compensator) -> list[str]:
+def typedefs(one: EmittedModel) -> list[str]:
     """The types of a model's numbers, including those of plays and sums unless a shared run time has them."""
     units, names, types = one.units, one.names, one.family.types
     real = f"typedef {one.family.real} {names.name}_real_t;"
@@ -229,7 +229,7 @@ def typedefs(one: Compensator) -> list[str]:
     return [codes, real, *(own if names.rt == names.name else [])]
 
 
-def limits(one: Compensator) -> list[str]:
+def limits(one: EmittedModel) -> list[str]:
     """The header's macros for a model's numbers."""
     numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
     bound, suffix = "against the double model, ", form.suffix
@@ -264,7 +264,7 @@ def limits(one: Compensator) -> list[str]:
     return _defined(one, found)
 
 
-def _timing(one: Compensator) -> list[Macro]:
+def _timing(one: EmittedModel) -> list[Macro]:
     """Macros about time: the sample time, and for a model with effects its consequences."""
     kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
     found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, between steps")]
@@ -284,7 +284,7 @@ def _timing(one: Compensator) -> list[Macro]:
     ]
 
 
-def status(one: Compensator) -> list[str]:
+def status(one: EmittedModel) -> list[str]:
     """The bits of the status functions."""
     limited = "inverse: the drive was limited to the drive range"
     envelope = "inverse: the argument of an envelope was limited"
@@ -360,7 +360,7 @@ BITS = {
 _PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
 
 
-def documented(pieces: Sequence[Piece], one: Compensator, cost: Cost) -> Iterator[Piece]:
+def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterator[Piece]:
     """Prototypes of a model's interface, each below its documentation."""
     for piece in pieces:
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
@@ -392,7 +392,7 @@ def _line(mark: str, text: str) -> list[str]:
     ) or [" *"]
 
 
-def _unit(what: str, one: Compensator) -> str:
+def _unit(what: str, one: EmittedModel) -> str:
     """A quantity with its unit: of the drive or the output, or a code in fixed point."""
     side = "drive" if what == "drive" else "output"
     words = {"drive": "drive", "output": "displacement", "reference": "reference"}[what]
@@ -400,7 +400,7 @@ def _unit(what: str, one: Compensator) -> str:
     return one.form.quantity(words, macro, getattr(one.units, side))
 
 
-def _parameter(name: str, call: str, one: Compensator) -> str:
+def _parameter(name: str, call: str, one: EmittedModel) -> str:
     form, macros = one.form, one.names.NAME
     if name == "self":
         return "the instance"
@@ -419,7 +419,7 @@ def _parameter(name: str, call: str, one: Compensator) -> str:
     return what + held
 
 
-def _answer(call: str, op: str, one: Compensator) -> str:
+def _answer(call: str, op: str, one: EmittedModel) -> str:
     if call == "status":
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "travel":
@@ -427,7 +427,7 @@ def _answer(call: str, op: str, one: Compensator) -> str:
     return _unit("drive" if op == "inverse" and call == "step" else "output", one)
 
 
-def _bits(call: str, op: str, one: Compensator) -> str:
+def _bits(call: str, op: str, one: EmittedModel) -> str:
     if call == "reset":
         return "cleared, then those of the step"
     if call == "status":
@@ -442,7 +442,7 @@ def _bits(call: str, op: str, one: Compensator) -> str:
     return ", ".join(found) or "none"
 
 
-def _cost(call: str, op: str, one: Compensator, cost: Cost) -> str:
+def _cost(call: str, op: str, one: EmittedModel, cost: Cost) -> str:
     if call == "step":
         return f"at most {dict(cost.worst_case)[op]}"
     if call == "commit" and one.corners and not one.variant.chain:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
-from hystgen.emission.compensator import Compensator, Form, Glue, Names, Numbers, Table, Writer
+from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Names, Numbers, Writer
 from hystgen.emission.cost import Cost, Data
-from hystgen.emission.fixed import Fixed
-from hystgen.emission.floating import Floating
+from hystgen.emission.fixed import FixedForm
+from hystgen.emission.floating import FloatingForm
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
 from hystgen.emission.text import define, fit
@@ -23,13 +23,13 @@ from hystgen.plays import slots
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
 
-FORMS: dict[str, Form] = {"float": Floating(), "fixed": Fixed()}
+FORMS: dict[str, Form] = {"float": FloatingForm(), "fixed": FixedForm()}
 """By kind of arithmetic."""
 
 WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
 
 
-def compensator(parameters: Parameters, cascade: StaticModel, options: Options) -> Compensator:
+def compensator(parameters: Parameters, cascade: StaticModel, options: Options) -> EmittedModel:
     """The compensator of a model. Raises FormatError."""
     compiled = _compiled(parameters, cascade, options)
     whole = runtime.FAMILIES[options.arithmetic]
@@ -50,7 +50,7 @@ def compensator(parameters: Parameters, cascade: StaticModel, options: Options) 
         if options.engine == "loop":
             glue = chain.alone(options.operators, cascade.pi.n, form)
     variant = _variant(options, family, cascade, numbers, compiled)
-    return Compensator(parameters, cascade, options, names, family, variant, form, numbers, compiled, glue)
+    return EmittedModel(parameters, cascade, options, names, family, variant, form, numbers, compiled, glue)
 
 
 def _compiled(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
@@ -96,8 +96,8 @@ class Code:
     kernels: str
     operators: str
     macros: tuple[str, ...]
-    plays: tuple[Table, ...]
-    beside: tuple[Table, ...]
+    plays: tuple[ConstantTable, ...]
+    beside: tuple[ConstantTable, ...]
     data: Data
 
     @property
@@ -106,14 +106,14 @@ class Code:
         return template("tables.c.j2", arrays=[each.text for each in (*self.plays, *self.beside)], code=self)
 
 
-def front(one: Compensator) -> str:
+def front(one: EmittedModel) -> str:
     """A model's functions under the run time's names: those that call its stages and those that call its blocks."""
     stages = one.numbers.stages
     whole = template("front.c.j2", stages=stages, branches=one.variant.branches) if stages else ""
     return f"{whole}\n{one.glue.functions}" if one.glue else whole
 
 
-def composed(one: Compensator) -> Code:
+def composed(one: EmittedModel) -> Code:
     """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
     family, names, operators = one.family, one.names, one.options.operators
     own_types: list[runtime.Piece] = []
@@ -162,7 +162,7 @@ def composed(one: Compensator) -> Code:
     )
 
 
-def _named(operators: str, every: Sequence[Table]) -> Collection[str]:
+def _named(operators: str, every: Sequence[ConstantTable]) -> Collection[str]:
     """The tables that functions use, directly or through another table."""
     named = set(re.findall(r"\w+", operators))
     for table in reversed(every):  # a table comes before those that name it
@@ -171,7 +171,7 @@ def _named(operators: str, every: Sequence[Table]) -> Collection[str]:
     return named
 
 
-def implementation(one: Compensator, code: Code) -> str:
+def implementation(one: EmittedModel, code: Code) -> str:
     """The operators with the parts of the run time that they need, except what a shared run time contains."""
     family, name, single = one.family, one.names.name, one.options.layout == "single-header"
     opening, apart, closing = (
@@ -194,7 +194,7 @@ class Module:
     sentence per option; `doubts`: why the inverse may be of little use, in sentences.
     """
 
-    compensator: Compensator
+    compensator: EmittedModel
     code: Code
     cost: Cost
     sha256: str

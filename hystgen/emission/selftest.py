@@ -12,7 +12,7 @@ import numpy as np
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS
-from hystgen.emission.compensator import Compensator, Form
+from hystgen.emission.compensator import EmittedModel, Form
 from hystgen.emission.text import literal
 from hystgen.plays import slots
 
@@ -68,7 +68,7 @@ class Operator:
     samples: list[Sample]
 
 
-def operators(one: Compensator) -> list[Operator]:
+def operators(one: EmittedModel) -> list[Operator]:
     """The tests of a model's operators."""
     wide = WIDE if one.family.arithmetic.travels > 1 else ()
     found = []
@@ -101,7 +101,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     return low + (0.5 + way) * (high - low)
 
 
-def _samples(one: Compensator, inverse: bool, settings: Sequence[str]) -> list[Sample]:
+def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[Sample]:
     numbers, between = one.numbers.tables, one.form.between
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first], numbers.limits[first + 1]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.front.dead_zone.compensator import dead_zone
 from hystgen.front.stage import StageTables
 from hystgen.front.tanh.compensator import envelope_forward, envelope_inverse
@@ -12,7 +10,7 @@ from hystgen.plays.slots import DEAD_ZONE
 
 
 @jit
-def front_forward(t: StageTables, v: Any, ascending: int) -> Any:
+def front_forward(t: StageTables, v: Scalar, ascending: int) -> Scalar:
     """w = G[v] on one branch, stage by stage from the drive."""
     w = v
     for j in range(len(t.stage_kind)):
@@ -27,7 +25,7 @@ def front_forward(t: StageTables, v: Any, ascending: int) -> Any:
 
 
 @jit
-def front_inverse(t: StageTables, w: Any, ascending: int) -> tuple[Any, int]:
+def front_inverse(t: StageTables, w: Scalar, ascending: int) -> tuple[Scalar, int]:
     """v = G^-1[w] on one branch, stages in reverse order, and whether an envelope's argument was limited."""
     v = w
     limited = 0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from hystgen.basics.jit import jit
 from hystgen.front.stage import CurveTables, Polynomials
 from hystgen.plays.fixed import nearest
@@ -16,7 +14,7 @@ FORWARD, INVERSE = 0, 2
 
 
 @jit
-def curve(t: Polynomials, which: int, x: Any) -> Any:
+def curve(t: Polynomials, which: int, x: int) -> int:
     """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that x lies on, h = 0 .. 1 along it."""
     j = t.first[which]
     high = j + t.pieces[which] - 1
@@ -34,7 +32,7 @@ def curve(t: Polynomials, which: int, x: Any) -> Any:
 
 
 @jit
-def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
+def front_forward(t: CurveTables, v: int, ascending: int) -> int:
     """w = G[v] on one branch."""
     if t.fronts:
         return curve(t, FORWARD + 1 - ascending, v)
@@ -42,7 +40,7 @@ def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
 
 
 @jit
-def front_inverse(t: CurveTables, w: Any, ascending: int) -> tuple[Any, int]:
+def front_inverse(t: CurveTables, w: int, ascending: int) -> tuple[int, int]:
     """v = G^-1[w] on one branch, one code beyond the range if w lies beyond it, and whether an envelope limits w."""
     if not t.fronts:
         return nearest(w, t.limits[FINE]), 0

@@ -6,7 +6,7 @@ both engines compute the same whole numbers, so that they agree in every bit.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 from hystgen.basics.jit import jit
 from hystgen.plays.loop import PlayTables, State, loop_output
@@ -40,7 +40,7 @@ class FixedPlayTables(PlayTables, Protocol):
 
 
 @jit
-def nearest(x: Any, bits: Any) -> Any:
+def nearest(x: int, bits: int) -> int:
     """x / 2^bits to the nearest integer, ties away from zero."""
     if bits == 0:
         return x
@@ -51,7 +51,7 @@ def nearest(x: Any, bits: Any) -> Any:
 
 
 @jit
-def code(t: FixedPlayTables, total: Any) -> tuple[Any, int]:
+def code(t: FixedPlayTables, total: int) -> tuple[int, int]:
     """Output code of a sum, limited to the type, and its status bits."""
     found = nearest(total, t.limits[FRACTION])
     bits = OUTPUT_CLAMPED if found > t.limits[SATURATED] or found < -t.limits[SATURATED] else 0
@@ -63,7 +63,7 @@ def code(t: FixedPlayTables, total: Any) -> tuple[Any, int]:
 
 
 @jit
-def divide_by_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
+def divide_by_slope(t: FixedPlayTables, d: int, k: int) -> int:
     """d / slope[k] to the nearest integer, d >= 0."""
     r = t.reciprocal[k]
     shift = t.shift[k]
@@ -72,7 +72,7 @@ def divide_by_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
 
 
 @jit
-def input_further(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
+def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> int:
     """The input of the plays at which the output is d beyond the output at w, at most a little outside their range."""
     step = divide_by_slope(t, d, k)
     if rising:
@@ -87,7 +87,7 @@ def input_further(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> An
 
 
 @jit
-def loop_solve(t: FixedPlayTables, s: State, output: Any) -> Any:
+def loop_solve(t: FixedPlayTables, s: State, output: int) -> int:
     """Input of the plays that gives `output`: on the way there, one play after another begins to follow."""
     here = loop_output(t, s)
     w = s.play[0]

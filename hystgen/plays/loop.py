@@ -8,11 +8,11 @@ because a literal would not have the arithmetic's type.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Element, Scalar, jit
 from hystgen.plays.slots import ZERO, Reals, StepState
 
 
@@ -53,7 +53,7 @@ def new_state(t: PlayTables) -> State:
 
 
 @jit
-def loop_rest(s: State, w: Any) -> None:
+def loop_rest(s: State, w: Scalar) -> None:
     """Every play holds w."""
     for i in range(len(s.play)):
         s.play[i] = w
@@ -67,12 +67,12 @@ def loop_start(s: State, start: Reals) -> None:
 
 
 @jit
-def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
+def loop_absorb(t: PlayTables, s: State, w: Scalar) -> None:
     """play_r[w] = max(w - r, min(w + r, play)), play by play."""
     for i in range(len(s.play)):
         low = w - t.threshold[i]
         high = w + t.threshold[i]
-        upper = s.play[i]
+        upper: Scalar = s.play[i]
         if upper > high:
             upper = high
         if upper < low:
@@ -81,7 +81,7 @@ def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
 
 
 @jit
-def loop_output(t: PlayTables, s: State) -> Any:
+def loop_output(t: PlayTables, s: State) -> Element:
     """p_0 play_0 + p_1 play_1 + ..., in this order."""
     total = t.limits[ZERO]
     for i in range(len(s.play)):
@@ -90,7 +90,7 @@ def loop_output(t: PlayTables, s: State) -> Any:
 
 
 @jit
-def loop_solve(t: LoopTables, s: State, output: Any) -> Any:
+def loop_solve(t: LoopTables, s: State, output: Scalar) -> Scalar:
     """Input of the plays that gives `output`: assumes that every play follows, then drops the largest thresholds one by
     one until the solution reaches the last play that is left."""
     rising = output >= loop_output(t, s)

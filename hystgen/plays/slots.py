@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import jit
-from hystgen.basics.structures import Flag, Real, Struct, UInt32
+from hystgen.basics.jit import N, jit
+from hystgen.basics.structures import Flag, NumberArray, Real, Struct, UInt32
 
-Reals = NDArray[Any]
-Counts = NDArray[np.int64]
+Reals = NumberArray
+Counts = NumberArray
 Bytes = NDArray[np.uint8]
 
 # arithmetic-independent names for places in the arrays below
@@ -57,7 +57,12 @@ class StepState(Struct):
     status: UInt32
 
 
+def firsts(lengths: Iterable[int]) -> Counts:
+    """Where lists of these lengths begin in a row of all, and where the last one ends."""
+    return np.cumsum([0, *lengths]).astype(np.int64)
+
+
 @jit(inline=True)
-def zero(x: Any) -> Any:
+def zero(x: N) -> N:
     """0 of the type of a finite x."""
     return x - x

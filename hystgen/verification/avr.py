@@ -28,7 +28,7 @@ class Size:
     """The number of plays of a model, and the memory that it is expected to take."""
 
     plays: int
-    memory: cost.Memory
+    memory: cost.MemoryBytes
 
 
 @dataclass(frozen=True)

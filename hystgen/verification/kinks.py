@@ -49,7 +49,7 @@ class _Textbook:
 
     def begin(self, op: int) -> None:
         """The memory after init, or after reset."""
-        start = self.tables.start.astype(float) if op == slots.OP_INIT else np.zeros(1)
+        start = np.array(self.tables.start, float) if op == slots.OP_INIT else np.zeros(1)
         states = np.broadcast_to(start, len(self.r) + 1)
         self.w, self.s = float(states[0]), states[1:].copy()
         self.drive, self.rising = np.nan, 1

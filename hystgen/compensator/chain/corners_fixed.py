@@ -4,10 +4,8 @@ of the plays, `chain_corners_finer.c`.
 
 from __future__ import annotations
 
-from typing import Any
-
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_fixed import asked, level
 from hystgen.compensator.chain.step import ChainState
 from hystgen.plays.corners import corners_fixed
@@ -35,9 +33,9 @@ def keep(to: Reals, kink: Kink) -> None:
 
 
 @jit
-def start(t: ChainTables, s: ChainState, zero: int) -> None:
+def start(t: FixedChainTables, s: ChainState, zero: int) -> None:
     """Set the plays to the start memory, or all to 0; only their positions are known then."""
-    m = s.corners
+    m: FixedMemory = s.corners
     corners_fixed.start(t.plays, m, t.plays.zero if zero else t.plays.start)
     for i in range(4):
         s.kink[i] = 0
@@ -46,13 +44,14 @@ def start(t: ChainTables, s: ChainState, zero: int) -> None:
 
 
 @jit
-def started(t: ChainTables, s: ChainState) -> Any:
+def started(t: FixedChainTables, s: ChainState) -> int:
     """Sum of the plays."""
-    return level(t, s.corners.here.output[0])
+    total: int = level(t, s.corners.here.output[0])
+    return total
 
 
 @jit
-def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
+def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: int) -> bool:
     """Move the plays to an input between the kink and the next one. Returns False if the input lies elsewhere."""
     kink = (kept[0], kept[1], kept[2], kept[3])
     moved = gained(t, m, kink, w)
@@ -63,16 +62,16 @@ def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
 
 
 @jit
-def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
+def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: int) -> bool:
     """Move the plays to any input between this kink and the next one, which it finds."""
     m.step.next[0] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
     return move_on(t, m, kept, w)
 
 
 @jit
-def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+def follow(t: FixedChainTables, s: ChainState, w: int) -> int:
     """Move the plays with their input w. Returns their sum."""
-    m = s.corners
+    m: FixedMemory = s.corners
     if s.own.inverse[0]:
         there = m.step.sought[0] != 0 and moved(t.plays, m, s.kink, w)
     else:
@@ -82,11 +81,12 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
         keep(s.kink, find_input(t.plays, m, w))
         moved(t.plays, m, s.kink, w)
     m.step.sought[0] = 0
-    return level(t, m.here.output[0])
+    total: int = level(t, m.here.output[0])
+    return total
 
 
 @jit
-def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
+def seen(t: FixedChainTables, m: FixedMemory, kept: Reals, w: int) -> None:
     """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
     x = along(m, w)
     if t.number.arriving_bits[0] > 0 and x > along(m, m.here.input[0]):
@@ -94,9 +94,9 @@ def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
 
 
 @jit
-def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+def inverse_input(t: FixedChainTables, s: ChainState, h: int) -> int:
     """Input of the plays at which their sum is h."""
-    m = s.corners
+    m: FixedMemory = s.corners
     w, kink = solve(t.plays, m, asked(t, h), m.step.next[0])
     keep(s.kink, kink)
     m.step.sought[0] = 1
@@ -105,12 +105,12 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
 
 
 @jit
-def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
+def finer(t: FixedChainTables, s: ChainState, h: int, w: int, a: int) -> int:
     """As in engine loop: the signal in front of the plays that gives their sum h, with more bits than their input w."""
     bits = t.number.arriving_bits[0]
     if bits == 0:
         return a
-    m = s.corners
+    m: FixedMemory = s.corners
     whole = a << bits
     x = along(m, w)
     on = x - along(m, m.here.input[0])

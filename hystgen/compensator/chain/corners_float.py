@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.basics.jit import Scalar, jit
+from hystgen.compensator.chain.layout import FloatChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.plays.corners import corners_float
-from hystgen.plays.corners.corners_float import copy_place, forget_line, move_to_output, plays_step
+from hystgen.plays.corners.corners_float import Memory, copy_place, forget_line, move_to_output, plays_step
 
 
 @jit
-def start(t: ChainTables, s: ChainState, zero: int) -> None:
+def start(t: FloatChainTables, s: ChainState, zero: int) -> None:
     """Set the plays to the start memory, or all to 0."""
     p = t.plays
     s.corners.step.sought[0] = 0
@@ -23,15 +21,16 @@ def start(t: ChainTables, s: ChainState, zero: int) -> None:
 
 
 @jit
-def started(t: ChainTables, s: ChainState) -> Any:  # noqa: ARG001  as in fixed point
+def started(t: FloatChainTables, s: ChainState) -> Scalar:  # noqa: ARG001  as in fixed point
     """Sum of the plays."""
-    return s.corners.here.input[0] if s.own.inverse[0] else s.corners.here.output[0]
+    m: Memory = s.corners
+    return m.here.input[0] if s.own.inverse[0] else m.here.output[0]
 
 
 @jit
-def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+def follow(t: FloatChainTables, s: ChainState, w: Scalar) -> Scalar:
     """Move the plays with their input w. Returns their sum."""
-    m = s.corners
+    m: Memory = s.corners
     if not s.own.inverse[0]:
         return plays_step(t.plays.forward, m, w)
     if w != m.here.output[0]:
@@ -45,9 +44,9 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
 
 
 @jit
-def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+def inverse_input(t: FloatChainTables, s: ChainState, h: Scalar) -> Scalar:
     """Input of the plays at which their sum is h."""
-    m = s.corners
+    m: Memory = s.corners
     copy_place(m.undo, m.here)
     m.step.sought[0] = 1
     return plays_step(t.plays.inverse, m, h)

@@ -15,9 +15,10 @@ import math
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.arithmetic import FIXED
 from hystgen.arithmetic.factors import LARGEST, factor
@@ -33,6 +34,7 @@ from hystgen.compensator.chain.layout import (
     Codes,
     Compiled,
     FixedChainNumbers,
+    FixedChainTables,
     OwnChainTables,
     ahead_of,
     braked,
@@ -49,11 +51,16 @@ from hystgen.compensator.chain.layout import (
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
+from hystgen.compensator.layout import FixedTables
 from hystgen.effects import bend
 from hystgen.effects.maps import MapTables, Wanted
 from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
+from hystgen.effects.plays import FixedMovingTables
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
+from hystgen.plays.slots import Reals
+
+M = TypeVar("M")
 
 TEMPERATURE_BITS = {15: 7, 31: 22}
 """Fraction bits of a temperature in degC, by the bits of a code: the range is +-256 or +-512 degrees."""
@@ -128,7 +135,7 @@ class _Builder:
         maps = self._maps()
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
-        tables = ChainTables(
+        given = FixedChainTables(
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
@@ -141,10 +148,7 @@ class _Builder:
             quiet(self.how, self.taps),
             int(self.turning),
         )
-        if self.parts.own_drives or self.parts.own_outputs:
-            tables = OwnChainTables(*tables)
-            own_sides = self.parts.own_drives, self.parts.own_outputs
-            tables.own_sides = tuple(map(type, own_sides[0])), tuple(map(type, own_sides[1]))
+        tables = OwnChainTables.with_own(given, self.parts)
         slewed = (0.5 + self._slewed) * bool(self.parts.slew)
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
@@ -167,7 +171,7 @@ class _Builder:
     def _refuse(self, what: str) -> None:
         raise FormatError((("model", "effects"), f"{what} for {self.arithmetic}; use {self.about.finer}"))
 
-    def _need(self, made: Callable[[], Any], what: str) -> Any:
+    def _need(self, made: Callable[[], M], what: str) -> M:
         try:
             return made()
         except OverflowError as error:
@@ -252,7 +256,7 @@ class _Builder:
         """Largest input that is asked of the plays."""
         return int(max(map(abs, self.inner.hull)) + self.inner.margin)
 
-    def _moving(self, plays: Any) -> Any:
+    def _moving(self, plays: FixedTables) -> FixedMovingTables:
         step = float(self.inner.step)
         farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still answer with the input beyond
         return moving.build_fixed(
@@ -269,9 +273,9 @@ class _Builder:
             self._refuse("noncongruent: plays are bent too sharply within their range")
             raise
 
-    def _limits(self, plays: Any) -> Any:
+    def _limits(self, plays: Reals) -> NDArray[Any]:
         """The limits of the whole chain."""
-        limits = plays.copy()
+        limits = np.array(plays)
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
         slack = Fraction(1, 1024)  # double precision may have moved an end off a code by this much
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
@@ -325,7 +329,7 @@ class _Builder:
         """Rounding error in codes of a slew-limited drive after crossing its range."""
         return crossing(self.static, self.parts, self.seconds) * 2.0**-REST_BITS
 
-    def _tables(self) -> tuple[Any, ...]:
+    def _tables(self) -> tuple[object, ...]:
         """The tables of all parts in order; those in front of the plays get as many bits as fit."""
         margin = Margin(1.0, turning=self.turning)
         about = FixedSurroundings(
@@ -335,12 +339,12 @@ class _Builder:
             self.signal(self.high - self.low), margin,
         )
 
-        def made(part: ChainPart) -> Any:
+        def made(part: ChainPart) -> object:
             pairs = zip(self.in_front.get(part.name) or self._behind(part), self.ones[part.name], strict=True)
             self.formats[part.name] = [part.fixed.formats(one, about, *sizes) for sizes, one in pairs]
             return part.fixed.tables(self.formats[part.name], about)
 
-        def ahead() -> dict[str, Any]:
+        def ahead() -> dict[str, object]:
             for bits in range(self._finest(), -1, -1):
                 self.finer = bits
                 try:
@@ -390,7 +394,7 @@ class _Builder:
         leads = [one.fineness for one in self.leading if one.fineness]
         return min(MOST_FINER, math.ceil(sum(leads)) + 1) if leads else 0
 
-    def _tap(self) -> Any:
+    def _tap(self) -> NDArray[np.int64]:
         rows = [factor(weight) for weight in self.taps.weights.tolist()] if self.taps else []
         return np.array(rows, dtype=np.int64).reshape(-1, 2)
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
@@ -18,8 +18,8 @@ from hystgen.compensator.chain.layout import (
     MOST_SLEWED,
     VERIFIED_SHARE,
     ChainNumbers,
-    ChainTables,
     Compiled,
+    FloatChainTables,
     OwnChainTables,
     Stages,
     ahead_of,
@@ -83,7 +83,7 @@ def build(
     largest = float(np.finfo(dtype).max) / 16
     static, parts = chain.cascade, Parts.of(chain.effects)
 
-    def reals(values: Any, what: str) -> NDArray[Any]:
+    def reals(values: ArrayLike, what: str) -> NDArray[Any]:
         found = np.array(values, dtype=np.float64)
         if found.size and not np.max(np.abs(found)) <= largest:
             message = f"{what} reach {np.max(np.abs(found)):.3g}, too large for {arithmetic}"
@@ -122,7 +122,7 @@ def build(
         seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
     )
     number = reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates")
-    tables = ChainTables(
+    tables = FloatChainTables(
         plays,
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
@@ -135,7 +135,5 @@ def build(
         quiet(how, taps),
         int(turning),
     )
-    if parts.own_drives or parts.own_outputs:
-        tables = OwnChainTables(*tables)
-        tables.own_sides = tuple(map(type, parts.own_drives)), tuple(map(type, parts.own_outputs))
-    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, *reading[1:])
+    own = OwnChainTables.with_own(tables, parts)
+    return Compiled(own, taps, parts, seconds, static, max_rate, how.preview, *reading[1:])

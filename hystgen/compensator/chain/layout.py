@@ -11,15 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.basics.jit import N
 from hystgen.basics.structures import Int64, Real, Struct, UInt8
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
+from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.maps import MapTables
 from hystgen.effects.part import One
+from hystgen.effects.plays import FixedMovingTables, MovingTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
@@ -101,14 +105,14 @@ class ChainTables(NamedTuple):
     in floating point; in fixed point their drive may have bits below a code; `behind`: maps of the output.
     """
 
-    plays: Any  # `Tables` or `FixedTables`
+    plays: Any  # narrowed by the two arithmetics, like the next ones
     limits: Reals
-    moving: Any  # `MovingTables` or `FixedMovingTables`
+    moving: Any
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # of their blocks
-    behind: Any  # `Stages`, or in fixed point `hystgen.effects.maps.MapTables`
+    behind: Any
     tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
-    number: Any  # `ChainNumbers` or `FixedChainNumbers`
+    number: Any
     slew: int  # 1 if the rate of the drive is limited
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
     turning: int  # 1 if a lag must not arrive at two branches from the wrong side
@@ -143,10 +147,36 @@ class ChainTables(NamedTuple):
         return threshold
 
 
+class FloatChainTables(ChainTables):
+    """The same in floating point."""
+
+    plays: Tables
+    moving: MovingTables
+    behind: Stages
+
+
+class FixedChainTables(ChainTables):
+    """The same in fixed point."""
+
+    plays: FixedTables
+    moving: FixedMovingTables
+    behind: MapTables
+    number: FixedChainNumbers
+
+
 class OwnChainTables(ChainTables):
     """The tables of a model with a user's own effects: `own_sides` has their classes, ahead of the plays and behind."""
 
     own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
+
+    @classmethod
+    def with_own(cls, tables: ChainTables, parts: Parts) -> ChainTables:
+        """The tables of a model, with these classes if there are any."""
+        if not (parts.own_drives or parts.own_outputs):
+            return tables
+        found = cls(*tables)
+        found.own_sides = tuple(map(type, parts.own_drives)), tuple(map(type, parts.own_outputs))
+        return found
 
     @property
     def own_effects(self) -> tuple[type[Effect], ...]:
@@ -294,7 +324,7 @@ HELD_CODES = 3
 two ahead of it, and rounding that drive to a code adds half of one."""
 
 
-def hold(rounded: Any, dither: Any, turning: bool) -> Any:
+def hold(rounded: N, dither: N, turning: bool) -> N:
     """Largest move back of the drive in front of two branches that does not count: from `rounded` computation, and from
     drives that differ from those asked for."""
     return rounded + (HELD_CODES if turning else 1) * dither

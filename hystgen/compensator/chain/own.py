@@ -10,21 +10,21 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants, OwnBlock
-from hystgen.effects.part import Function, Margin, One, Realized, Responses, Verbs
-from hystgen.plays.slots import Counts, Reals
+from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
+from hystgen.plays.slots import Counts, Reals, firsts
 
-Glue = tuple[Function, Function, Function]
+Glue = tuple[Answer, Answer, Answer]
 """The functions that an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
 
 SAME = 1e-9
@@ -259,7 +259,7 @@ class Rounded:
     __sub__ = __add__
 
 
-def _apply(effect: Effect, verb: str, *given: Any) -> Any:
+def _apply(effect: Effect, verb: str, *given: object) -> Any:
     assert effect.block is not None
     return getattr(effect.block, verb)(*given)
 
@@ -357,12 +357,12 @@ def _adds_up(one: Linear, seconds: float) -> bool:
     return True
 
 
-def build(every: Sequence[Linear], reals: Any) -> OwnTables:
+def build(every: Sequence[Linear], reals: Callable[[ArrayLike, str], Reals]) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
     return OwnTables(
-        np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
+        firsts(len(each.numbers) for each in every),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
-        np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
+        firsts(len(each.settled) for each in every),
         np.zeros(len(every), dtype=np.int64),
     )
 
@@ -382,13 +382,13 @@ def constants(t: OwnTables, kinds: Sequence[type[Effect]], products: int = 1) ->
 
 
 @jit(inline=True)
-def product(number: Any, x: Any) -> Any:
+def product(number: Scalar, x: Scalar) -> Scalar:
     """A number of the table times x."""
     return number * x
 
 
 @jit(inline=True)
-def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+def passed(t: OwnTables, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
     """A signal of the chain as one of block j, and the reverse: the number is the same."""
     return x
 
@@ -396,7 +396,7 @@ def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed po
 # ---------------------------------------------------------------- as a part of the chain
 
 
-def memory(t: OwnTables, dtype: Any) -> Reals:
+def memory(t: OwnTables, dtype: DTypeLike) -> Reals:
     """Memory (m,) of all blocks on one side of the plays."""
     return np.zeros(t.place[-1], dtype)
 
@@ -406,13 +406,13 @@ def arithmetic(
     effects: Sequence[type[Effect]],
     made: Glue,
     products: int,
-    tables: Function,
-    formats: Function = lambda one, *_: one,
+    tables: Callable[..., object],
+    formats: Callable[..., object] = lambda one, *_: one,
 ) -> Realized:
     """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications in one of
     theirs; `tables`, `formats`: as in `Realized`."""
 
-    def through(verb: str) -> Function:
+    def through(verb: str) -> Answer:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
         return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
 
@@ -422,30 +422,30 @@ def arithmetic(
     return Realized(verbs, lambda t: constants(t, effects, products), tables, formats)
 
 
-def _both(first: Function, behind: Function) -> Function:
+def _both(first: Answer, behind: Answer) -> Answer:
     """A verb of two blocks in series."""
 
     @jit
-    def both(t: OwnTables, s: Reals, j: int, x: Any) -> Any:
+    def both(t: OwnTables, s: Reals, j: int, x: Scalar) -> Scalar:
         return behind(t, s, j, first(t, s, j, x))
 
     return both
 
 
-def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Function:
+def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Answer:
     """A verb of block j, bound to its numbers and memory."""
     product, entered, left = made
     function = block.compiled(verb, product)
     if verb == "resting":
 
         @jit
-        def resting(t: OwnTables, s: Reals, k: int, y: Any) -> Any:  # noqa: ARG001  as in every block
+        def resting(t: OwnTables, s: Reals, k: int, y: Scalar) -> Scalar:  # noqa: ARG001  as in every block
             return left(t, j, function(t.number[t.first[j] : t.first[j + 1]], entered(t, j, y)))
 
         return resting
 
     @jit
-    def call(t: OwnTables, s: Reals, k: int, x: Any) -> Any:  # noqa: ARG001  as in every block
+    def call(t: OwnTables, s: Reals, k: int, x: Scalar) -> Scalar:  # noqa: ARG001  as in every block
         row, memory = t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]]
         return left(t, j, function(row, memory, entered(t, j, x)))
 

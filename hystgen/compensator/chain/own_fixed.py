@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
@@ -24,6 +25,7 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.own import Instance
 from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
+from hystgen.plays.slots import firsts
 
 Row = tuple[tuple[int, int], int, int]
 """The members of a `FixedNumber`."""
@@ -148,7 +150,7 @@ class _Trace:
         def signal(size: float) -> _Traced:
             return _Traced(0.0, 0.0, most).made(size * 2.0**bits, 0.0)
 
-        def state() -> Any:
+        def state() -> NDArray[np.object_]:
             return np.array([signal(size) for size in (self.given * self.linear.sizes()).tolist()], dtype=object)
 
         given, asked = signal(self.given), signal(self.asked)
@@ -184,9 +186,9 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
 def build(rows: Sequence[Formats]) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
     return OwnTables(
-        np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
+        firsts(len(each.table) for each in rows),
         FixedNumber.of([number for each in rows for number in each.table]),
-        np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
+        firsts(len(each.linear.settled) for each in rows),
         np.array([each.bits for each in rows], dtype=np.int64),
     )
 
@@ -195,19 +197,20 @@ def build(rows: Sequence[Formats]) -> OwnTables:
 
 
 @jit
-def product(number: Any, x: Any) -> Any:
+def product(number: Any, x: int) -> int:
     """A number of the table times x, rounded to the nearest whole number."""
-    return times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
+    found: int = times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
+    return found
 
 
 @jit
-def entered(t: OwnTables, j: int, x: Any) -> Any:
+def entered(t: OwnTables, j: int, x: int) -> int:
     """A signal of the chain as one of block j."""
     return x << t.bits[j]
 
 
 @jit
-def left(t: OwnTables, j: int, x: Any) -> Any:
+def left(t: OwnTables, j: int, x: int) -> int:
     """A signal of block j as one of the chain."""
     return nearest(x, t.bits[j])
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.problems import FormatError
 from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
@@ -196,7 +196,7 @@ def led(needed: Taps, samples: int | None) -> Taps:
 # ---------------------------------------------------------------- preview.c
 
 
-class Line(NamedTuple):
+class PreviewLine(NamedTuple):
     """The last samples of the reference (L,), the newest one last, and whether there are any yet (1,)."""
 
     sample: Reals
@@ -204,7 +204,7 @@ class Line(NamedTuple):
 
 
 @jit
-def preview_put(line: Line, x: Any) -> None:
+def preview_put(line: PreviewLine, x: Scalar) -> None:
     """Append a sample; the first one fills the line."""
     n = len(line.sample)
     for i in range(n - 1):
@@ -214,14 +214,14 @@ def preview_put(line: Line, x: Any) -> None:
 
 
 @jit
-def preview_repeat(line: Line) -> None:
+def preview_repeat(line: PreviewLine) -> None:
     """Append the newest sample again, if there is one."""
     if line.filled[0]:
         preview_put(line, line.sample[len(line.sample) - 1])
 
 
 @jit
-def preview_target(tap: Reals, line: Line) -> Any:
+def preview_target(tap: Reals, line: PreviewLine) -> Scalar:
     """The output to reach at this sample: the weighted sum of the line."""
     total = tap[0] * line.sample[0]
     for i in range(1, len(tap)):

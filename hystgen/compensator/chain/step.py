@@ -7,17 +7,16 @@ between codes and signals, come from the arithmetic (`step_float`, `step_fixed`)
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
-from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
-from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
-from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
+from hystgen.compensator.chain.preview import PreviewLine, preview_put, preview_repeat
+from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
@@ -90,7 +89,7 @@ class ChainState(NamedTuple):
     bent: Reals  # (n + 1,), contribution of each play, if an effect moves or bends plays
     blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
-    line: Line
+    line: PreviewLine
     own: OwnState
     reached: RampState
     quiet: QuietState
@@ -112,7 +111,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         np.zeros(len(t.threshold), dtype),
         tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
         np.where([inverse and part.forward for part in parts], 0, t.counts),
-        Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
+        PreviewLine(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         OwnState.of([(0, 0, 0, 0, inverse)], dtype),
         RampState.zeros(1, dtype),
         QuietState.zeros(1, dtype),
@@ -122,30 +121,30 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
     )
 
 
-class Codes(NamedTuple):
+class Conversions(NamedTuple):
     """Conversions of an operator's arguments into signals, and of signals into its answers, in one arithmetic."""
 
-    finite: Callable[..., Any]
-    drive_signal: Callable[..., Any]
-    arriving: Callable[..., Any]  # a signal as an input of the plays
-    level_signal: Callable[..., Any]
-    drive_code: Callable[..., Any]
-    output_code: Callable[..., Any]  # with status bits
-    entered_travel: Callable[..., Any]  # as verification sets it
-    shared: Callable[..., Any]  # a share of a signal
+    finite: Check
+    drive_signal: Answer
+    arriving: Answer  # a signal as an input of the plays
+    level_signal: Answer
+    drive_code: Answer
+    output_code: LimitedAnswer  # with status bits
+    entered_travel: Answer  # as verification sets it
+    shared: Answer  # a share of a signal
 
 
 def made_of(
-    blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
+    blocks: Blocks, codes: Conversions, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
 ) -> tuple[Operations, Operations]:
     """The operations of the forward operator and the inverse of models with effects in one arithmetic, with a user's
     own blocks in front of the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
-    temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
-    clock: Any = every[CLOCK]
+    clock: Any = every[CLOCK]  # which has all of these
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
-    travelled_by: Any = every[AGED].travelled
+    travelled_by = every[AGED].travelled
+    assert travelled_by
     bent, unbent = blocks.bent
     preview_target = blocks.target
     front_forward, front_inverse = blocks.front
@@ -157,22 +156,21 @@ def made_of(
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
-    side = sides_of(every)
-    sent_rest, sent_absorb = side.sent_rest, side.sent_absorb
-    drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
-    output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
-    output_side_resting, output_side_solve = side.output_resting, side.output_solve
+    sent_rest, sent_absorb = side_of(every, SENT, "rest", "absorb")
+    drive_side_rest, drive_side_absorb, drive_side_solve = side_of(every, AHEAD, "rest", "absorb", "solve")
+    output_side_rest, output_side_absorb = side_of(every, BEHIND, "rest", "absorb")
+    output_side_resting, output_side_solve = side_of(every, BEHIND, "resting", "solve")
 
     @jit(inline=True)
-    def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
+    def displacement(t: ChainTables, s: ChainState, y: Scalar) -> Scalar:
         """The displacement: the result of the output side after saturation, plus the offsets."""
-        offset = t.number.output_offset[0] + s.own.offset[0]
+        offset: Scalar = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
             offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
         return bent(t.behind, y) + offset
 
     @jit(inline=True)
-    def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
+    def undisplaced(t: ChainTables, s: ChainState, u: Scalar) -> tuple[Scalar, int]:
         """The result that the output side has to give for the displacement u, and whether there is none."""
         offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
@@ -190,14 +188,14 @@ def made_of(
         blocks_reset(t, s)
 
     @jit
-    def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
+    def travelled(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Move the drive from where it was to v, in one sample."""
         blocks_move(t, s, s.own.applied[0], v)
 
     # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
 
     @jit(inline=True)
-    def turns(t: ChainTables, back: Any, way: Any) -> bool:
+    def turns(t: ChainTables, back: Scalar, way: Scalar) -> bool:
         """Whether a drive that should go back by `back` turns to the other branch, `way` from there. Behind a lag it
         turns only if holding misses more than the lag misses of that way in the first sample of a turn."""
         missed = back - t.plays.limits[HOLD]
@@ -208,7 +206,7 @@ def made_of(
     # ---------------------------------------------------------------- chain_two_branches.c
 
     @jit
-    def branch_drive(t: ChainTables, s: ChainState, h: Any, w: Any) -> Any:
+    def branch_drive(t: ChainTables, s: ChainState, h: Scalar, w: Scalar) -> Scalar:
         """The drive that gives w on the branch of its own move: it stays on its branch while it moves on or holds, and
         turns only for more than rounding."""
         if not t.plays.branches:
@@ -237,7 +235,7 @@ def made_of(
         s.steady.rises[0] = 1
 
     @jit
-    def steady_drive(t: ChainTables, s: ChainState, a: Any) -> Any:
+    def steady_drive(t: ChainTables, s: ChainState, a: Scalar) -> Scalar:
         """The drive that leads to a in front of two branches, through a lag arriving from the side of its branch."""
         s.steady.rises[0] = s.plays.step.ascending[0]
         if a > s.plays.step.drive[0]:
@@ -250,7 +248,7 @@ def made_of(
         return v
 
     @jit
-    def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
+    def steady_hold(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
         """The drive v, or one that keeps the lag on its branch."""
         last = drive_signal(t, s.own.applied[0])
         return led_kept(t.blocks[LED], s.blocks[LED], v, s.steady.rises[0], last, t.number.dither[0])
@@ -258,14 +256,14 @@ def made_of(
     # ---------------------------------------------------------------- quiet.c
 
     @jit
-    def quiet_rest(t: ChainTables, s: ChainState, a: Any) -> None:
+    def quiet_rest(t: ChainTables, s: ChainState, a: Scalar) -> None:
         """Settle everything with a in front of the plays."""
         s.quiet.arrived[0] = a
         s.quiet.reference[0] = t.limits[ZERO]
         s.quiet.equal[0] = 0
 
     @jit
-    def quiet_count(t: ChainTables, s: ChainState, u: Any) -> None:
+    def quiet_count(t: ChainTables, s: ChainState, u: Scalar) -> None:
         """Count references equal to the next one, u."""
         if u != s.quiet.reference[0]:
             s.quiet.reference[0] = u
@@ -274,7 +272,7 @@ def made_of(
             s.quiet.equal[0] += 1
 
     @jit
-    def quiet_drive(t: ChainTables, s: ChainState, a: Any, v: Any) -> Any:
+    def quiet_drive(t: ChainTables, s: ChainState, a: Scalar, v: Scalar) -> Scalar:
         """The drive for a in front of the plays: v, which leads there, or one that stands still."""
         most = t.number.dither[0]
         away = v - a
@@ -295,7 +293,7 @@ def made_of(
     # ---------------------------------------------------------------- chain.c
 
     @jit
-    def expected(t: ChainTables, s: ChainState) -> Any:
+    def expected(t: ChainTables, s: ChainState) -> Scalar:
         """The displacement that the model expects from the last absorbed drive."""
         code, _ = output_code(t, displacement(t, s, s.own.output[0]))
         return code
@@ -317,7 +315,7 @@ def made_of(
         s.own.output[0] = output_side_rest(t, s, s.plays.step.level[0])
 
     @jit
-    def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
+    def absorb(t: ChainTables, s: ChainState, v: Scalar, reached: Scalar) -> None:
         """Absorb drive v, which is `reached` behind its delay and slew limit; the first drive finds everything at
         rest."""
         moving = s.own.moving[0] != 0
@@ -346,7 +344,7 @@ def made_of(
     # ---------------------------------------------------------------- chain_slew.c
 
     @jit
-    def nearest_ramp(t: ChainTables, before: Any, rest: Any, v: Any) -> tuple[Any, Any]:
+    def nearest_ramp(t: ChainTables, before: Scalar, rest: Scalar, v: Scalar) -> tuple[Scalar, Scalar]:
         """The drive nearest to v that the amplifier reaches in one step from `before` with rounding remainder `rest`,
         and its own remainder."""
         if v > before or (v == before and rest < 0):
@@ -358,25 +356,24 @@ def made_of(
         return (drive, left) if beyond else (v, t.limits[ZERO])
 
     @jit
-    def forward_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
+    def forward_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
         """The drive nearest to v that the amplifier reaches in one step; v itself in the first step."""
         if not t.slew:
             return v
-        drive, rest = v, t.limits[ZERO]
-        if s.own.moving[0]:
-            drive, rest = nearest_ramp(t, s.reached.drive[0], s.reached.rest[0], v)
-        s.reached.drive[0], s.reached.rest[0] = drive, rest
+        before, rest = s.reached.drive[0], s.reached.rest[0]
+        drive, left = nearest_ramp(t, before, rest, v) if s.own.moving[0] else (v, t.limits[ZERO])
+        s.reached.drive[0], s.reached.rest[0] = drive, left
         return drive
 
     @jit
-    def inverse_within(t: ChainTables, s: ChainState, v: Any) -> tuple[Any, Any]:
+    def inverse_within(t: ChainTables, s: ChainState, v: Scalar) -> tuple[Scalar, Scalar]:
         """The drive nearest to v that the amplifier reaches in one step from the last applied drive, and its rounding
         remainder; the last drive keeps its own remainder if it was the answer."""
         rest = s.reached.rest[0] if s.own.applied[0] == s.reached.drive[0] else t.limits[ZERO]
         return nearest_ramp(t, s.own.applied[0], rest, v)
 
     @jit
-    def inverse_held(t: ChainTables, s: ChainState) -> Any:
+    def inverse_held(t: ChainTables, s: ChainState) -> Scalar:
         """The last answer again, or the drive nearest to it that the amplifier reaches in one step."""
         last = s.plays.step.answer[0] if s.plays.step.stepped[0] else s.own.applied[0]
         if not t.slew or not s.own.moving[0]:
@@ -389,7 +386,7 @@ def made_of(
     # ---------------------------------------------------------------- chain_unbraked.c or one of chain_braked*.c
 
     @jit
-    def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
+    def inverse_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
         """The drive in reach nearest to v, or the one from which a lag does not overshoot."""
         if not t.slew or not s.own.moving[0]:
             return v
@@ -403,7 +400,7 @@ def made_of(
         return near
 
     @jit
-    def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
+    def forward_absorb(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v: it passes the delay, and the amplifier follows."""
         late = sent_absorb(t, s, v) if s.own.moving[0] else sent_rest(t, s, v)
         reached = forward_slewed(t, s, late)
@@ -417,12 +414,12 @@ def made_of(
         return s.plays
 
     @jit(inline=True)
-    def shown(t: ChainTables, s: ChainState) -> tuple[Any, int]:
+    def shown(t: ChainTables, s: ChainState) -> tuple[Scalar, int]:
         """The present displacement, and its status."""
-        return output_code(t, displacement(t, s, s.own.output[0]))  # type: ignore[no-any-return]
+        return output_code(t, displacement(t, s, s.own.output[0]))
 
     @jit
-    def inverse_put(t: ChainTables, s: ChainState, level: Any) -> Any:
+    def inverse_put(t: ChainTables, s: ChainState, level: Scalar) -> Scalar:
         """Take the next reference, already limited, through the preview if there is one. Returns the output to reach at
         this sample."""
         if t.quiet:
@@ -438,7 +435,7 @@ def made_of(
         return preview_target(t.tap, s.line)
 
     @jit
-    def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
+    def inverse_push(t: ChainTables, s: ChainState, u: Scalar) -> None:
         """Take the next reference of the preview without answering it."""
         if not finite(t, u):
             s.plays.step.status[0] |= HELD
@@ -455,12 +452,12 @@ def made_of(
         preview_repeat(s.line)
 
     @jit(inline=True)
-    def stands(t: ChainTables, s: ChainState, u: Any) -> bool:  # noqa: ARG001
+    def stands(t: ChainTables, s: ChainState, u: Scalar) -> bool:  # noqa: ARG001
         """Never: every reference is answered anew, since time has passed for the effects."""
         return False
 
     @jit
-    def inverse_sought(t: ChainTables, s: ChainState, level: Any) -> Any:
+    def inverse_sought(t: ChainTables, s: ChainState, level: Scalar) -> Scalar:
         """The drive for the limited reference `level`, within reach of a slew limit."""
         y = inverse_put(t, s, level)
         moving = s.own.moving[0] != 0
@@ -480,7 +477,7 @@ def made_of(
         return reached
 
     @jit
-    def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+    def put_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
         """Set the offset of the displacement, within its limits."""
         if not finite(t, d):
             s.plays.step.status[0] |= HELD
@@ -495,7 +492,7 @@ def made_of(
         s.own.offset[0] = inside
 
     @jit
-    def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+    def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
         """Set the offset of the displacement; drift starts again."""
         put_offset(t, s, d)
         if finite(t, d):
@@ -503,34 +500,27 @@ def made_of(
                 clock_reset(t.blocks[CLOCK], s.blocks[CLOCK], j)
 
     @jit
-    def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
+    def correct(t: ChainTables, s: ChainState, measured: Scalar, share: Scalar) -> None:
         """Trim the offset by a share of the difference between measured and expected displacement."""
         more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.own.output[0]))
         put_offset(t, s, s.own.offset[0] + more)
 
-    @jit
-    def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
-        """Set the temperature."""
-        if not finite(t, degrees):
-            s.plays.step.status[0] |= HELD
-        elif temperature_set(t, s, degrees):
-            s.plays.step.status[0] |= LIMITED_SETTING
+    def setting(put: Check) -> Action:
+        """A call that sets a number of the blocks by `put`."""
 
-    @jit
-    def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
-        """Set a gain that replaces the one that follows the travel."""
-        if not finite(t, gain):
-            s.plays.step.status[0] |= HELD
-        elif gain_set(t, s, gain):
-            s.plays.step.status[0] |= LIMITED_SETTING
+        @jit
+        def set_number(t: ChainTables, s: ChainState, x: Scalar) -> None:
+            """Set it, within its limits."""
+            if not finite(t, x):
+                s.plays.step.status[0] |= HELD
+            elif put(t, s, x):
+                s.plays.step.status[0] |= LIMITED_SETTING
 
-    @jit
-    def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
-        """Set the distance travelled."""
-        if not finite(t, travel):
-            s.plays.step.status[0] |= HELD
-        elif travel_set(t, s, travel):
-            s.plays.step.status[0] |= LIMITED_SETTING
+        return set_number
+
+    set_temperature, set_gain, set_travel = (
+        setting(told(every, f"set_{what}")) for what in ("temperature", "gain", "travel")
+    )
 
     @jit
     def start_at(t: ChainTables, s: ChainState, after: int) -> None:
@@ -554,7 +544,7 @@ def made_of(
         start_at(t, s, 1)
 
     @jit
-    def seen(t: ChainTables, s: ChainState, v: Any) -> None:
+    def seen(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v in either operator."""
         if s.own.inverse[0]:
             absorb(t, s, v, v)
@@ -562,7 +552,7 @@ def made_of(
             forward_absorb(t, s, v)
 
     @jit
-    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
+    def settle(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Bring everything to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
             s.plays.step.status[0] |= HELD
@@ -576,7 +566,7 @@ def made_of(
         seen(t, s, inside)
 
     @jit
-    def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
+    def other(t: ChainTables, s: ChainState, call: int, x: Scalar) -> Scalar:
         """Run a call that only models with effects have. Returns its answer, or 0."""
         if call == OP_PUSH:
             inverse_push(t, s, x)

@@ -5,17 +5,17 @@ Signals in front of the plays are in units of their input, signals behind the pl
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
-from hystgen.compensator.chain.layout import REST_BITS, TRAVEL_BITS, ChainTables
+from hystgen.compensator.chain.layout import REST_BITS, TRAVEL_BITS, FixedChainTables
 from hystgen.compensator.chain.parts import LED, PARTS
-from hystgen.compensator.chain.preview import Line
+from hystgen.compensator.chain.preview import PreviewLine
 from hystgen.compensator.chain.sides import Blocks
-from hystgen.compensator.chain.step import ChainState, Codes
+from hystgen.compensator.chain.step import ChainState, Conversions
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
@@ -26,13 +26,13 @@ from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
 
 
 @jit
-def front_forward(t: FixedTables, a: Any, ascending: int) -> Any:
+def front_forward(t: FixedTables, a: int, ascending: int) -> int:
     """Input of the plays for a signal in front of the memoryless part."""
     return curve.front_forward(t, a, ascending) if t.fronts else a
 
 
 @jit
-def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
+def front_inverse(t: FixedTables, w: int, ascending: int) -> tuple[int, int]:
     """The signal in front of the memoryless part for an input of the plays, and whether an envelope limited it."""
     if t.fronts:
         return curve.front_inverse(t, w, ascending)
@@ -43,7 +43,7 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 
 
 @jit
-def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
+def finer(t: FixedChainTables, s: ChainState, h: int, w: int, a: int) -> int:
     """The signal in front of the plays at which their sum is h, with more bits than their input w: the remainder of h
     at w is divided by the slope."""
     bits = t.number.arriving_bits[0]
@@ -77,7 +77,7 @@ def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
 
 
 @jit
-def preview_target(tap: Reals, line: Line) -> Any:
+def preview_target(tap: Reals, line: PreviewLine) -> int:
     """The output to reach at this sample: the weighted sum of the line."""
     total = zero(line.sample[0])
     for i in range(len(tap)):
@@ -89,25 +89,25 @@ def preview_target(tap: Reals, line: Line) -> Any:
 
 
 @jit
-def drive_signal(t: ChainTables, v: Any) -> Any:
+def drive_signal(t: FixedChainTables, v: int) -> int:
     """A drive code as a signal."""
     return v << t.number.drive_bits[0]
 
 
 @jit
-def arriving(t: ChainTables, a: Any) -> Any:
+def arriving(t: FixedChainTables, a: int) -> int:
     """A signal in front of the plays in units of their input."""
     return nearest(a, t.number.arriving_bits[0])
 
 
 @jit
-def level_signal(t: ChainTables, u: Any) -> Any:
+def level_signal(t: FixedChainTables, u: int) -> int:
     """An output code as a signal."""
     return u << t.number.level_bits[0]
 
 
 @jit
-def drive_code(t: ChainTables, x: Any) -> Any:
+def drive_code(t: FixedChainTables, x: int) -> int:
     """The drive code of a signal, limited to two spans beyond the range."""
     code = nearest(x, t.number.drive_bits[0])
     if code > t.number.most_code[0]:
@@ -118,7 +118,7 @@ def drive_code(t: ChainTables, x: Any) -> Any:
 
 
 @jit
-def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
+def output_code(t: FixedChainTables, y: int) -> tuple[int, int]:
     """The output code of a signal, limited to the type, and its status."""
     code = nearest(y, t.number.level_bits[0])
     if code > t.limits[CODE_MAX]:
@@ -129,13 +129,13 @@ def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
 
 
 @jit
-def entered_travel(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in floating point
+def entered_travel(t: FixedChainTables, x: int) -> int:  # noqa: ARG001  as in floating point
     """A travel in drive codes for an argument that is a code."""
     return x << TRAVEL_BITS
 
 
 @jit
-def shared(t: ChainTables, share: Any, x: Any) -> Any:
+def shared(t: FixedChainTables, share: int, x: int) -> int:
     """A share of a signal. The share is a code; the largest code stands for almost 1."""
     return times(x, share << t.number.share_bits[0], 31)
 
@@ -144,11 +144,11 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 led = PARTS[LED].fixed.verbs.led
 assert led
-led_braked = led.braked
+led_braked: Callable[..., int] = led.braked
 
 
 @jit
-def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
+def braked(t: FixedChainTables, s: ChainState, v: int, near: int) -> int:
     """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
     bits = t.number.drive_bits[0]
     beyond = v - near if v > near else near - v
@@ -163,7 +163,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
 
 
 @jit
-def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
+def ramp(before: int, rest: int, move: int, more: int) -> tuple[int, int]:
     """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
     left = rest + more
     whole = (left + (1 << (REST_BITS - 1))) >> REST_BITS
@@ -175,6 +175,6 @@ BLOCKS = Blocks(
     moving_fixed.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
-CODES = Codes(
+CODES = Conversions(
     step_fixed.finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared
 )

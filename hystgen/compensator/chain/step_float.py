@@ -2,53 +2,51 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import corners_float, moving_float
-from hystgen.compensator.chain.layout import ChainTables, Stages
+from hystgen.compensator.chain.layout import FloatChainTables, Stages
 from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
-from hystgen.compensator.chain.step import ChainState, Codes
+from hystgen.compensator.chain.step import ChainState, Conversions
 from hystgen.front.compensator import front_forward, front_inverse
 
 # ---------------------------------------------------------------- chain_float.c
 
 
 @jit(inline=True)
-def bent(t: Stages, x: Any) -> Any:
+def bent(t: Stages, x: Scalar) -> Scalar:
     """The output of the saturation for the input x."""
     return front_forward(t, x, 1)
 
 
 @jit(inline=True)
-def unbent(t: Stages, y: Any) -> tuple[Any, int]:
+def unbent(t: Stages, y: Scalar) -> tuple[Scalar, int]:
     """The input of the saturation that gives y, and whether there is none."""
     return front_inverse(t, y, 1)
 
 
 @jit(inline=True)
-def entered(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+def entered(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
     """A number from the caller as a signal."""
     return x
 
 
 @jit(inline=True)
-def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:  # noqa: ARG001  as in fixed point
+def finer(t: FloatChainTables, s: ChainState, h: Scalar, w: Scalar, a: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
     """The signal in front of the plays, which is already as fine as it gets."""
     return a
 
 
 @jit(inline=True)
-def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:  # noqa: ARG001  as in fixed point
+def output_code(t: FloatChainTables, y: Scalar) -> tuple[Scalar, int]:  # noqa: ARG001  as in fixed point
     """A displacement as the caller gets it, and its status."""
     return y, 0
 
 
 @jit(inline=True)
-def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+def shared(t: FloatChainTables, share: Scalar, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
     """A share of x."""
     return share * x
 
@@ -57,11 +55,12 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 led = PARTS[LED].floating.verbs.led
 assert led
-led_braked, HALVES = led.braked, led.halves
+led_braked: Answer = led.braked
+HALVES = led.halves
 
 
 @jit
-def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
+def braked(t: FloatChainTables, s: ChainState, v: Scalar, near: Scalar) -> Scalar:
     """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
     beyond = v - near if v > near else near - v
     falling, rising = t.number.slew_falling[0], t.number.slew_rising[0]
@@ -72,7 +71,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
 
 
 @jit
-def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
+def ramp(before: Scalar, rest: Scalar, move: Scalar, more: Scalar) -> tuple[Scalar, Scalar]:
     """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
     following = before + move
     moved = following - before
@@ -86,4 +85,4 @@ BLOCKS = Blocks(
     moving_float.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
-CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)
+CODES = Conversions(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

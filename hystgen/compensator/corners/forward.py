@@ -1,18 +1,17 @@
-"""The forward operator without a memoryless part: `forward.c`."""
+"""The forward operator: `forward.c`, with or without a memoryless part."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.compensator.layout import Tables
-from hystgen.compensator.step import corners_of
-from hystgen.plays.corners.corners_float import Memory, Start, plays_step, start
+from hystgen.compensator.step import corners_of, turn_to
+from hystgen.front.compensator import front_forward
+from hystgen.plays.corners.corners_float import Memory, plays_step, start
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
 
 @jit(inline=True)
-def forward_step(t: Tables, m: Memory, v: Any) -> Any:
+def forward_step(t: Tables, m: Memory, v: Scalar) -> Scalar:
     """Answer one sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
         if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
@@ -20,32 +19,24 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
             return m.here.output[0] + t.limits[OFFSET]
         v = t.limits[DRIVE_MIN] if v < t.limits[DRIVE_MIN] else t.limits[DRIVE_MAX]
         m.step.status[0] |= INPUT_CLAMPED
-    return plays_step(t.forward, m, v) + t.limits[OFFSET]
+    turn_to(m, v)
+    return plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0])) + t.limits[OFFSET]
 
 
 @jit
-def forward_begin(t: Tables, m: Memory, which: Start) -> None:
-    """The part that init and reset share."""
-    start(t.forward, m, which)
+def forward_begin(t: Tables, m: Memory, zero: int) -> None:
+    """Set the start memory of the parameter file, or all plays to 0."""
+    start(t.forward, m, t.forward_zero if zero else t.forward_first)
+    m.step.drive[0] = t.applied[zero]
+    m.step.ascending[0] = t.ascending[zero]
     m.step.status[0] = 0
 
 
 @jit
-def forward_init(t: Tables, m: Memory) -> None:
-    """Set the start memory of the parameter file."""
-    forward_begin(t, m, t.forward_first)
-
-
-@jit
-def forward_reset(t: Tables, m: Memory) -> None:
-    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-    forward_begin(t, m, t.forward_zero)
-
-
-@jit
-def forward_visit(t: Tables, m: Memory, v: Any) -> None:
+def forward_visit(t: Tables, m: Memory, v: Scalar) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
-    plays_step(t.forward, m, v)
+    turn_to(m, v)
+    plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0]))
 
 
-OPERATIONS = corners_of(forward_init, forward_reset, forward_visit, forward_step)
+OPERATIONS = corners_of(forward_begin, forward_visit, forward_step)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import (
     Memory,
-    Start,
     copy_place,
     forget_line,
     move_in_block,
@@ -33,7 +30,7 @@ from hystgen.plays.slots import (
 
 
 @jit
-def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
+def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
     """Answer any sample except a usual one."""
     x = u - t.limits[OFFSET]
     bits = 0
@@ -58,7 +55,7 @@ def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
 
 
 @jit(inline=True)
-def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
+def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
     """Answer one sample."""
     rising = m.here.rising[0]
     x = u - t.limits[OFFSET]
@@ -80,7 +77,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
 
 
 @jit
-def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
+def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
@@ -102,9 +99,9 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 
 
 @jit
-def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
-    """The part that init and reset share."""
-    start(t.inverse, m, which)
+def inverse_begin(t: Tables, m: Memory, zero: int) -> None:
+    """Set the start memory of the parameter file, or all plays to 0."""
+    start(t.inverse, m, t.inverse_zero if zero else t.inverse_first)
     move_to_output(t.inverse, m, clamp_drive(t, m.here.output[0]))
     copy_place(m.undo, m.here)
     m.step.before[0] = m.here.input[0]
@@ -114,23 +111,11 @@ def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
 
 
 @jit
-def inverse_init(t: Tables, m: Memory) -> None:
-    """Set the start memory of the parameter file."""
-    inverse_begin(t, m, t.inverse_first)
-
-
-@jit
-def inverse_reset(t: Tables, m: Memory) -> None:
-    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-    inverse_begin(t, m, t.inverse_zero)
-
-
-@jit
-def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
+def inverse_visit(t: Tables, m: Memory, v: Scalar) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
     copy_place(m.undo, m.here)
     m.step.before[0] = m.here.input[0]
 
 
-OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)
+OPERATIONS = corners_of(inverse_begin, inverse_visit, inverse_step, inverse_commit)

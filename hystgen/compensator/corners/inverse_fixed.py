@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
 from hystgen.compensator.step import corners_of
@@ -20,14 +18,13 @@ from hystgen.plays.slots import (
     OUTPUT_MAX,
     OUTPUT_MIN,
     SHY,
-    Reals,
 )
 
 NEVER = -(2**31)
 
 
 @jit(inline=True)
-def inverse_along(m: FixedMemory, u: Any) -> Any:
+def inverse_along(m: FixedMemory, u: int) -> int:
     """A reference along the present move; ~u is -u - 1, which never overflows for a code."""
     return u if m.here.rising[0] else ~u
 
@@ -40,7 +37,7 @@ def inverse_stay(m: FixedMemory) -> None:
 
 
 @jit
-def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
+def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: int) -> None:
     """Make steps usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.here.rising[0]
     most = inverse_along(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
@@ -54,7 +51,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
 
 
 @jit
-def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+def inverse_search(t: FixedTables, m: FixedMemory, u: int) -> int:
     """Answer any sample except a usual one."""
     copy_place(m.undo, m.here)
     m.step.usual[0] = 0
@@ -75,7 +72,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 
 @jit
-def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
     """Answer one sample."""
     on = along(m, (u << t.limits[FRACTION]) - m.here.output[0])
     if inverse_along(m, u) < m.step.next[0] and on > 0 and u != m.step.reference[0]:
@@ -91,7 +88,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 
 @jit
-def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
+def inverse_commit(t: FixedTables, m: FixedMemory, applied: int) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied)
     if v != applied:
@@ -107,9 +104,9 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 
 @jit
-def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
-    """The part that init and reset share."""
-    start(t, m, play)
+def inverse_begin(t: FixedTables, m: FixedMemory, zero: int) -> None:
+    """Set the start memory of the parameter file, or all plays to 0."""
+    start(t, m, t.zero if zero else t.start)
     copy_place(m.undo, m.here)
     inverse_stay(m)
     m.step.before[0] = 0
@@ -120,23 +117,11 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 
 @jit
-def inverse_init(t: FixedTables, m: FixedMemory) -> None:
-    """Set the start memory of the parameter file."""
-    inverse_begin(t, m, t.start)
-
-
-@jit
-def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
-    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-    inverse_begin(t, m, t.zero)
-
-
-@jit
-def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
+def inverse_visit(t: FixedTables, m: FixedMemory, v: int) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
     copy_place(m.undo, m.here)
     inverse_stay(m)
 
 
-OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)
+OPERATIONS = corners_of(inverse_begin, inverse_visit, inverse_step, inverse_commit)

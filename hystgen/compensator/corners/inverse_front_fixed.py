@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from hystgen.basics.jit import jit
-from hystgen.compensator.corners.inverse_front import choosing
+from hystgen.compensator.corners.inverse_front import inverse_keep
 from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
-from hystgen.compensator.step import corners_of
+from hystgen.compensator.step import choosing, corners_of, turn_to
 from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.corners_float import copy_place
 from hystgen.plays.fixed import code
-from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, Reals
+from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 inverse_choose = choosing(front_inverse)
 
 
 @jit
-def inverse_keep(m: FixedMemory) -> None:
-    """Keep the place to which a commit goes back."""
-    copy_place(m.undo, m.here)
-    m.step.undo_drive[0] = m.step.drive[0]
-    m.step.undo_ascending[0] = m.step.ascending[0]
-
-
-@jit
-def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
-    """Move the actuator to drive v; the direction of the move picks the branch. Returns the input of the plays."""
-    if v > m.step.drive[0]:
-        m.step.ascending[0] = 1
-    elif v < m.step.drive[0]:
-        m.step.ascending[0] = 0
-    m.step.drive[0] = v
+def inverse_arrive(t: FixedTables, m: FixedMemory, v: int) -> int:
+    """Move the actuator to drive v. Returns the input of the plays."""
+    turn_to(m, v)
     return front_forward(t, v, m.step.ascending[0])
 
 
 @jit
-def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
     """Answer one sample."""
     inverse_keep(m)
     if not (m.step.repeated[0] and u == m.step.reference[0]):
@@ -57,7 +43,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 
 @jit
-def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
+def inverse_commit(t: FixedTables, m: FixedMemory, applied: int) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied)
     if v != applied:
@@ -71,11 +57,11 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 
 @jit
-def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
-    """The part that init and reset share; `first` as in `FixedTables.applied`."""
-    start(t, m, play)
-    m.step.drive[0] = t.applied[first]
-    m.step.ascending[0] = t.ascending[first]
+def inverse_begin(t: FixedTables, m: FixedMemory, zero: int) -> None:
+    """Set the start memory of the parameter file, or all plays to 0."""
+    start(t, m, t.zero if zero else t.start)
+    m.step.drive[0] = t.applied[2 + zero]
+    m.step.ascending[0] = t.ascending[2 + zero]
     inverse_keep(m)
     m.step.reference[0] = 0
     m.step.last[0] = code(t, m.here.output[0])[0]
@@ -86,23 +72,11 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
 
 
 @jit
-def inverse_init(t: FixedTables, m: FixedMemory) -> None:
-    """Set the start memory of the parameter file."""
-    inverse_begin(t, m, t.start, 2)
-
-
-@jit
-def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
-    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-    inverse_begin(t, m, t.zero, 3)
-
-
-@jit
-def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
+def inverse_visit(t: FixedTables, m: FixedMemory, v: int) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
     m.step.last[0] = code(t, m.here.output[0])[0]
 
 
-OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)
+OPERATIONS = corners_of(inverse_begin, inverse_visit, inverse_step, inverse_commit)

@@ -6,16 +6,16 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
+from hystgen.basics.jit import Action, Answer, Check, Scalar, jit
+from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
@@ -202,15 +202,9 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     piece = about.reals([each.tolist() for curve in curves for each in curve], "travels of the ageing")
     return AgeingTables(
         AgeingNumbers.of([(*row[:3], *n, *row[3:]) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
-        np.cumsum([0, *counts]).astype(np.int64),
+        firsts(counts),
         AgeingPiece.of(piece, piece.dtype),
     )
-
-
-def constants(t: AgeingTables) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
 
 
 class UnevenAgeing:
@@ -232,16 +226,23 @@ class UnevenAgeing:
 
 
 @jit
-def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
-    """The gain at a travel; past the last piece it stays constant."""
-    low = t.first[j]
-    high = t.first[j + 1]
+def piece_at(first: Counts, begin: NumberArray, j: int, travel: Scalar) -> int:
+    """The piece of the gain of block j at a travel."""
+    low = first[j]
+    high = first[j + 1]
     while high - low > 1:
         middle = (low + high) // 2
-        if travel >= t.piece.begin[middle]:
+        if travel >= begin[middle]:
             low = middle
         else:
             high = middle
+    return low
+
+
+@jit
+def ageing_gain(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
+    """The gain at a travel; past the last piece it stays constant."""
+    low = piece_at(t.first, t.piece.begin, j, travel)
     share = (travel - t.piece.begin[low]) * t.piece.inverse_length[low]
     if share > t.block.one[j]:
         share = t.block.one[j]
@@ -249,7 +250,7 @@ def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
 
 
 @jit
-def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
+def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < zero(t.block.one[j]):
@@ -265,19 +266,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 
 @jit
-def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
-    """Return to the state of the parameter file: nothing has been travelled."""
-    ageing_set_travel(t, s, j, zero(t.block.last[j]))
-
-
-@jit
-def ageing_travelled(s: AgeingState, j: int) -> Any:
-    """The travel."""
-    return s.high[j]
-
-
-@jit
-def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
+def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
     if inside < t.block.least[j]:
@@ -291,12 +280,12 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scalar) -> None:
     """The drive has moved to v."""
     way = v - before
     change = (way if way >= zero(way) else -way) + s.low[j]
     high = s.high[j]
-    following = high + change
+    following: Scalar = high + change
     if following > t.block.last[j]:
         following = t.block.last[j]
         change = following - high
@@ -304,7 +293,7 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
     s.low[j] = change - (following - high)
     if s.own[j]:
         gain = ageing_gain(t, j, following)
-        inverse = s.inverse[j]
+        inverse: Scalar = s.inverse[j]
         for _ in range(t.block.turns[j]):
             inverse = inverse * (t.block.two[j] - gain * inverse)
         s.gain[j] = gain
@@ -312,23 +301,41 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
 
 
 @jit(inline=True)
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return y * s.inverse[j]
 
 
 @jit(inline=True)
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.gain[j] * x
 
 
+def verbs(
+    state: type[Struct], absorb: Answer, solve: Answer, move: Action, set_gain: Check, set_travel: Check
+) -> Verbs:
+    """The verbs of ageing from its functions in an arithmetic."""
+
+    @jit
+    def reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+        """Return to the state of the parameter file: nothing has been travelled."""
+        set_travel(t, s, j, zero(t.block.last[j]))
+
+    @jit
+    def travelled(s: AgeingState, j: int) -> Scalar:
+        """The travel."""
+        return s.high[j]
+
+    return Verbs(
+        memory_of(state), absorb=absorb, solve=solve, reset=reset, move=move,
+        set_gain=set_gain, set_travel=set_travel, travelled=travelled,
+    )
+
+
 ARITHMETIC = Realized(
-    Verbs(
-        memory_of(AgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
-        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
-    ),
-    constants, tables, kinds=(KIND,),
+    verbs(AgeingState, ageing_absorb, ageing_solve, ageing_move, ageing_set, ageing_set_travel),
+    numbered(KIND, 5, 1), tables, kinds=(KIND,),
 )
 
 PART = ChainPart(

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8, memory_of
+from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import Aged, AgeingPiece, ageing_travelled
+from hystgen.effects.ageing.compensator import Aged, AgeingPiece, piece_at
 from hystgen.effects.gains import (
     GAIN_BITS,
     LARGEST,
@@ -26,9 +24,9 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants, Rows
-from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
-from hystgen.plays.slots import Counts, zero
+from hystgen.effects.kinds import Rows, numbered
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
+from hystgen.plays.slots import Counts, firsts, zero
 
 SHARE_BITS = 20
 """Fraction bits of the share of a piece; the gain changes by a hundredth along a piece, so it gets 27."""
@@ -81,12 +79,6 @@ class FixedAgeingTables(NamedTuple):
     piece: FixedAgeingPiece
 
 
-def constants(t: FixedAgeingTables) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (8 + 2 * int(row["turns"]), 2), t.piece[first : first + row["n"]])
-
-
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
     """Pieces of the gain and Newton steps of each ageing effect, for drive codes of `lsb`.
 
@@ -106,7 +98,7 @@ def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> Fi
             piece.append((at, share, drop, [round(c * ONE) for c in curve]))
             last = at + round(length)
         block.append((last, len(piece) - before, turns, bits))
-    first = np.cumsum([0, *(n for _, n, *_ in block)]).astype(np.int64)
+    first = firsts(n for _, n, *_ in block)
     return FixedAgeingTables(FixedAgeingTable.of(block), first, FixedAgeingPiece.of(piece))
 
 
@@ -142,16 +134,9 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgei
 
 
 @jit
-def ageing_gain(t: FixedAgeingTables, j: int, travel: Any) -> Any:
+def ageing_gain(t: FixedAgeingTables, j: int, travel: int) -> int:
     """The gain at a travel; past the last piece it stays constant."""
-    low = t.first[j]
-    high = t.first[j + 1]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if travel >= t.piece.begin[middle]:
-            low = middle
-        else:
-            high = middle
+    low = piece_at(t.first, t.piece.begin, j, travel)
     on = (travel - t.piece.begin[low]) >> t.piece.drop[low]
     share = times(on, t.piece.share.mantissa[low], t.piece.share.shift[low])
     if share > 1 << SHARE_BITS:
@@ -163,7 +148,7 @@ def ageing_gain(t: FixedAgeingTables, j: int, travel: Any) -> Any:
 
 
 @jit
-def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: Any) -> bool:
+def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: int) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < 0:
@@ -178,13 +163,7 @@ def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel:
 
 
 @jit
-def ageing_reset(t: FixedAgeingTables, s: FixedAgeingState, j: int) -> None:
-    """Return to the state of the parameter file: nothing has been travelled."""
-    ageing_set_travel(t, s, j, zero(t.block.last[j]))
-
-
-@jit
-def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: Any) -> bool:
+def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: int) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     given = gain << t.block.bits[j]
     inside = given
@@ -199,7 +178,7 @@ def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: Any) -> 
 
 
 @jit
-def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: Any, v: Any) -> None:
+def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: int, v: int) -> None:
     """The drive has moved to v."""
     way = v - before
     following = s.high[j] + (way if way >= 0 else -way)
@@ -213,21 +192,18 @@ def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: Any, 
 
 
 @jit
-def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y, s.inverse[j], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.gain[j], GAIN_BITS)
 
 
 ARITHMETIC = Realized(
-    Verbs(
-        memory_of(FixedAgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
-        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
-    ),
-    constants, made, formats, kinds=(KIND,),
+    floating.verbs(FixedAgeingState, ageing_absorb, ageing_solve, ageing_move, ageing_set, ageing_set_travel),
+    numbered(KIND, 8, 2), made, formats, kinds=(KIND,),
 )

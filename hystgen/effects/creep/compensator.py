@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -172,31 +172,20 @@ class CreepMemory(NamedTuple):
     term: CreepTermState
 
 
-def firsts(blocks: Sequence[CreepNumbers]) -> Counts:
-    """Where the states of each block begin, and those of the last one end."""
-    return np.cumsum([0, *(len(one.terms) for one in blocks)]).astype(np.int64)
-
-
-def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
+def tables(blocks: Sequence[CreepNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]]) -> CreepTables:
     """The tables of several blocks in floating point; `reals`: converts named numbers to the arithmetic."""
     given = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
     rows = reals(given, "constants of the creep")
     terms = reals(np.concatenate([np.empty((0, 2)), *(shares(one.terms) for one in blocks)]), "creep")
     return CreepTables(
         CreepTable.of([(*row, len(one.terms)) for row, one in zip(rows, blocks, strict=True)], rows.dtype),
-        firsts(blocks),
+        firsts(len(one.terms) for one in blocks),
         CreepTerm.of(terms, terms.dtype),
     )
 
 
-def constants(t: CreepTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (1 + 2 * int(row["n"]), 1), t.term[first : first + row["n"]])
-
-
 @jit
-def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
+def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     """Everything has settled at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -209,19 +198,19 @@ def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
 
 
 @jit(inline=True)
-def creep_resting(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return y * t.block.inverse_rest[j]
 
 
 @jit(inline=True)
-def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:
+def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:
     """The input that gives the output y at this sample."""
     return (y - s.block.ahead[j]) * t.block.inverse_slope[j]
 
 
 @jit
-def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
+def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     """The input is x at this sample. Returns the output."""
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
@@ -237,7 +226,7 @@ def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), numbered(KIND, 1, 1, 2),
     lambda blocks, about: tables(blocks, about.reals), kinds=(KIND,),
 )
 
@@ -272,7 +261,9 @@ class UnevenCreep(Block):
         return float(FUNCTIONS[verb](self.table, self.state, 0, x))
 
 
-FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}
+FUNCTIONS: dict[str, Answer] = {
+    "rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb,
+}
 
 PART = ChainPart(
     "creep", "creep", Place.LINEAR, called("creep"),

@@ -8,9 +8,9 @@ rounding leaves a dead band but no limit cycle.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, memory_of
-from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import CreepNumbers
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 
 class FixedCreepTerm(Struct):
@@ -76,12 +75,6 @@ class FixedCreepMemory(NamedTuple):
 
     block: FixedCreepState
     term: FixedCreepTermState
-
-
-def constants(t: FixedCreepTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row, first in zip(t.block, t.first, strict=False):
-        yield Constants(KIND, row, (2 + 6 * int(row["n"]), 2), t.term[first : first + row["n"]])
 
 
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
@@ -151,15 +144,15 @@ def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTa
         for rate, _early, late, weight in one.terms.tolist():
             lift = lifted(late, bits)
             term.append((*map(factor, (rate * 2.0**drop, late * 2.0 ** (bits - lift), weight)), lift))
-    firsts = floating.firsts([each.one for each in blocks])
-    return FixedCreepTables(FixedCreepTable.of(block), firsts, FixedCreepTerm.of(term))
+    first = firsts(len(each.one.terms) for each in blocks)
+    return FixedCreepTables(FixedCreepTable.of(block), first, FixedCreepTerm.of(term))
 
 
 # ---------------------------------------------------------------- creep_fixed.c
 
 
 @jit
-def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
+def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
     """Everything has settled at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -173,20 +166,20 @@ def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def creep_resting(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return times(y, t.block.inverse_rest.mantissa[j], t.block.inverse_rest.shift[j])
 
 
 @jit
-def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:
+def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int:
     """The input that gives the output y at this sample."""
     change = times(y - s.block.ahead[j], t.block.inverse_slope.mantissa[j], t.block.inverse_slope.shift[j])
     return s.block.before[j] + change
 
 
 @jit
-def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
+def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
     """The input is x at this sample. Returns the output."""
     change = x - s.block.before[j]
     direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])
@@ -206,6 +199,6 @@ def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> An
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(FixedCreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    Verbs(memory_of(FixedCreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), numbered(KIND, 2, 2, 6),
     tables, formats, kinds=(KIND,),
 )

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from hystgen.arithmetic.factors import factor, times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.effects.base import Place
-from hystgen.effects.part import ChainPart, Function, One, Realized, Setting, Surroundings, Verbs, called
+from hystgen.effects.part import ChainPart, One, Realized, Setting, Surroundings, Verbs, called
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -59,7 +60,7 @@ def numbers(seconds: float, step: float) -> tuple[float, int]:
 
 
 @jit
-def delay_rest(line: Waiting, v: Any) -> None:
+def delay_rest(line: Waiting, v: Scalar) -> None:
     """The drive has always been v."""
     for i in range(len(line.sample)):
         line.sample[i] = v
@@ -67,49 +68,49 @@ def delay_rest(line: Waiting, v: Any) -> None:
 
 
 @jit
-def delay_next(line: Waiting) -> Any:
+def delay_next(line: Waiting) -> int:
     """The index after the oldest sample's."""
     following = line.oldest[0] + 1
     return following if following < len(line.sample) else 0
 
 
 @jit
-def delay_put(line: Waiting, v: Any) -> None:
+def delay_put(line: Waiting, v: Scalar) -> None:
     """The drive is v at this sample."""
     line.sample[line.oldest[0]] = v
     line.oldest[0] = delay_next(line)
 
 
 @jit
-def delayed(t: DelayTables, line: Waiting) -> Any:
+def delayed(t: DelayTables, line: Waiting) -> Scalar:
     """The drive that leaves the delay now."""
     oldest = line.sample[line.oldest[0]]
     return oldest + t.share[0] * (line.sample[delay_next(line)] - oldest)
 
 
 @jit
-def fixed_delayed(t: DelayTables, line: Waiting) -> Any:
+def fixed_delayed(t: DelayTables, line: Waiting) -> Scalar:
     """The same in fixed point, to the nearest code."""
     oldest = line.sample[line.oldest[0]]
     return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])
 
 
-def memory(t: DelayTables, dtype: Any) -> Waiting:
+def memory(t: DelayTables, dtype: DTypeLike) -> Waiting:
     """Memory of the delay of a model."""
     return Waiting(np.zeros(t.samples, dtype), np.zeros(1, np.int64))
 
 
-def verbs(delayed: Function) -> Verbs:
+def verbs(delayed: Answer) -> Verbs:
     """The verbs of a delay in one arithmetic, from its function `delayed`."""
 
     @jit
-    def rest(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  block interface
+    def rest(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
         """The drive has always been v. Returns the delayed drive."""
         delay_rest(line, v)
         return delayed(t, line)
 
     @jit
-    def absorb(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  block interface
+    def absorb(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
         """The drive is v at this sample. Returns the delayed drive."""
         delay_put(line, v)
         return delayed(t, line)
@@ -117,7 +118,7 @@ def verbs(delayed: Function) -> Verbs:
     return Verbs(memory, rest, absorb)
 
 
-def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], NDArray[Any]]) -> DelayTables:
     """The tables of a model's delays, which add up to one; `share`: converts a share to the arithmetic."""
     waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
@@ -133,7 +134,7 @@ FIXED_ARITHMETIC = Realized(
 )
 
 
-def problems(_: Any, at: Setting) -> Iterator[str]:
+def problems(_: object, at: Setting) -> Iterator[str]:
     """Why the forward operator cannot keep the drives that wait."""
     delay = math.fsum(each.dead_time for each in at.listed)
     if at.operator != "inverse" and delay > MOST_SAMPLES * at.seconds:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Action, Answer, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Unmeasured, Verbs, called, late
+from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import zero
 
 # ---------------------------------------------------------------- clock.c
@@ -55,11 +54,6 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
     return seconds, block, CARRY_SAMPLES, effect.rate, 0.5 * change, farthest, 1.0, float(ahead)
 
 
-def constants(t: ClockNumbers) -> list[Constants]:
-    """The numbers of a model's clock."""
-    return [Constants(KIND, row, (5, 0)) for row in t]
-
-
 @jit
 def clock_start(t: ClockNumbers, s: ClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
@@ -68,7 +62,7 @@ def clock_start(t: ClockNumbers, s: ClockState, j: int) -> None:  # noqa: ARG001
 
 
 @jit
-def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Scalar, v: Scalar) -> None:  # noqa: ARG001  block interface
     """One sample later."""
     following = s.low[j] + t.one[j]
     if following >= t.carry[j]:
@@ -79,7 +73,7 @@ def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Any, v: Any) -> N
 
 
 @jit
-def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Any) -> Any:
+def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Scalar) -> Scalar:
     """The drift `ahead` samples after the present one."""
     time = s.high[j] * t.block[j] + (s.low[j] + ahead) * t.sample[j]
     drift = (t.rate[j] + t.half_change[j] * time) * time
@@ -90,11 +84,11 @@ def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Any) -> Any:
     return drift
 
 
-def verbs(memory: Function, start: Function, tick: Function, drift: Function) -> Verbs:
+def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Answer) -> Verbs:
     """The verbs of a clock from its functions in an arithmetic."""
 
     @jit
-    def added(t: ClockNumbers, s: ClockState, j: int) -> Any:
+    def added(t: ClockNumbers, s: ClockState, j: int) -> Scalar:
         """The drift now."""
         return drift(t, s, j, zero(t.one[j]))
 
@@ -107,7 +101,7 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function) ->
         s.lead[j] = t.most_ahead[j] if following > t.most_ahead[j] else following
 
     @jit
-    def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Any:
+    def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Scalar:
         """The drift by the time of the newest reference."""
         late = s.lead[j] if filled else zero(t.one[j])
         return drift(t, s, j, late + t.one[j] if moving else late)
@@ -122,7 +116,7 @@ def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurrounding
 
 
 ARITHMETIC = Realized(
-    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,)
+    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), numbered(KIND, 5), tables, kinds=(KIND,)
 )
 
 PART = ChainPart(

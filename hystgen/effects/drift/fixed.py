@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Kind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import zero
 
@@ -105,11 +104,6 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     return high
 
 
-def constants(t: FixedClockNumbers) -> list[Constants]:
-    """The numbers of a model's clock."""
-    return [Constants(KIND, row, (3, 0)) for row in t]
-
-
 # ---------------------------------------------------------------- clock_fixed.c
 
 
@@ -123,7 +117,7 @@ def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # no
 
 
 @jit
-def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: int, v: int) -> None:  # noqa: ARG001  block interface
     """One sample later."""
     if s.count[j] >= t.samples[j]:
         return
@@ -136,7 +130,7 @@ def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: Any, v:
 
 
 @jit
-def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: Any) -> Any:
+def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) -> int:
     """The drift `ahead` samples after the present one."""
     more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
     drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])
@@ -153,6 +147,6 @@ def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: flo
 
 
 ARITHMETIC = Realized(
-    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), constants,
+    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), numbered(KIND, 3),
     lambda clocks, _: FixedClockNumbers.of([one.table for one in clocks]), formats, kinds=(KIND,),
 )

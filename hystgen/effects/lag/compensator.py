@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import N, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Block, Place, decays
 from hystgen.effects.kinds import Constants, Kind
@@ -220,7 +220,7 @@ class LagMemory(NamedTuple):
     inverted: ExactState
 
 
-def tables(lags: Sequence[LagNumbers], reals: Callable[[Any, str], Any], braked: int = 0) -> LagTables:
+def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]], braked: int = 0) -> LagTables:
     """The tables of several lags in floating point; `reals`: converts named numbers to the arithmetic."""
     rows = reals([(one.rate, one.second, one.late, one.inverse) for one in lags], "constants of the lag")
     return LagTables(
@@ -237,7 +237,7 @@ def constants(t: LagTables) -> Iterator[Constants]:
 
 
 @jit
-def lag_rest(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
+def lag_rest(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
     """Everything has settled at the input x. Returns the output."""
     if t.exact[j]:
         s.inverted.reached[j] = x
@@ -253,7 +253,7 @@ def lag_rest(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def lag_solve(t: LagTables, s: LagMemory, j: int, y: Any) -> Any:
+def lag_solve(t: LagTables, s: LagMemory, j: int, y: Scalar) -> Scalar:
     """The input that leads to the output y at this sample."""
     if t.exact[j]:
         reached = s.inverted.reached[j]
@@ -266,7 +266,7 @@ def lag_solve(t: LagTables, s: LagMemory, j: int, y: Any) -> Any:
 
 
 @jit
-def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
+def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
     """The input is x at this sample. Returns the output."""
     if t.exact[j]:
         reached = s.inverted.reached[j]
@@ -288,13 +288,13 @@ def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def steady_missed(t: LagTables, way: Any) -> Any:
+def steady_missed(t: LagTables, way: Scalar) -> Scalar:
     """How far a model's only lag falls short of a move in its first sample."""
     return t.led.theta[0] * way
 
 
 @jit
-def steady_led(way: Any, moved: Any) -> Any:
+def steady_led(way: N, moved: N) -> N:
     """The led part of a target's move, at most `MOST_LED` times the move before."""
     most = moved + moved
     least = most - most
@@ -305,8 +305,8 @@ def steady_led(way: Any, moved: Any) -> Any:
 
 @jit
 def steady_solve(
-    t: LagTables, s: LagMemory, y: Any, moved: Any, rises: int, applied: Any, little: Any
-) -> tuple[Any, Any]:
+    t: LagTables, s: LagMemory, y: Scalar, moved: Scalar, rises: int, applied: Scalar, little: Scalar
+) -> tuple[Scalar, Scalar]:
     """The input that leads a model's only lag to the output y without turning it back from the direction `rises`, and
     the move to y from the output asked for before, to which it had `moved`. A brake sees only the led part of the move,
     and the previous input's shortfall."""
@@ -321,7 +321,7 @@ def steady_solve(
 
 
 @jit
-def steady_kept(t: LagTables, s: LagMemory, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  used in fixed point
+def steady_kept(t: LagTables, s: LagMemory, v: Scalar, rises: int, applied: Scalar, little: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
     """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else one with which x comes to
     rest without going back: the last one, `applied`, or one ahead of x by `little`."""
     x = s.led.high[0]
@@ -334,7 +334,7 @@ def steady_kept(t: LagTables, s: LagMemory, v: Any, rises: int, applied: Any, li
 
 
 @jit
-def steady_absorb(s: LagMemory, before: Any) -> None:
+def steady_absorb(s: LagMemory, before: Scalar) -> None:
     """The lag has followed from x = `before`. The rounding error of a sum is known exactly unless x has moved by more
     than its own size; it could then take x back, and is dropped."""
     x = s.led.high[0]
@@ -347,7 +347,9 @@ def steady_absorb(s: LagMemory, before: Any) -> None:
 
 
 @jit
-def braked(t: LagTables, s: LagMemory, near: Any, short: Any, falling: Any, rising: Any, halves: int) -> Any:
+def braked(
+    t: LagTables, s: LagMemory, near: Scalar, short: Scalar, falling: Scalar, rising: Scalar, halves: int
+) -> Scalar:
     """The drive at which a model's only lag does not overshoot, although the drive comes back by at most `falling` or
     `rising` a step.
 
@@ -362,7 +364,7 @@ def braked(t: LagTables, s: LagMemory, near: Any, short: Any, falling: Any, risi
     if not room > 0:
         return near
     move = s.led.asked[0] - s.led.earlier[0]
-    way = move
+    way: Scalar = move
     if move > rising:
         way = rising
     elif move < -falling:
@@ -378,7 +380,9 @@ def braked(t: LagTables, s: LagMemory, near: Any, short: Any, falling: Any, risi
 
 
 @jit
-def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any, halves: int) -> Any:
+def braked_over(
+    size: Scalar, most: Scalar, lead: Scalar, back: Scalar, room: Scalar, half: Scalar, halves: int
+) -> Scalar:
     """Excess of a lead over the largest one that comes back in time, within `room`; `most` gains `size` at once."""
     margin = back * half
     over = lead - most
@@ -400,7 +404,7 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
 
 
 @jit
-def steady_state(s: LagMemory) -> Any:
+def steady_state(s: LagMemory) -> Scalar:
     """The state of the lag."""
     return s.led.high[0]
 

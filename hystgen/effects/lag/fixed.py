@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -174,13 +174,13 @@ COARSE = 2**30 - 1
 
 
 @jit
-def scaled(t: FixedLagTable | FixedExactTable, j: int, x: Any, by: Factor) -> Any:
+def scaled(t: FixedLagTable | FixedExactTable, j: int, x: int, by: Factor) -> int:
     """A number of a state's units times a factor of lag j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
+def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
     """Everything has settled at the input x. Returns the output."""
     if t.exact[j]:
         s.inverted.next[j] = x << t.inverted.bits[j]
@@ -196,7 +196,7 @@ def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: Any) -> Any:
+def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
     """The input that leads to the output y at this sample."""
     if t.exact[j]:
         left = (y << t.inverted.bits[j]) - s.inverted.next[j]
@@ -208,7 +208,7 @@ def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: Any) -> Any:
 
 
 @jit
-def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
+def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
     """The input is x at this sample. Returns the output."""
     if t.exact[j]:
         late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
@@ -230,7 +230,7 @@ def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def steady_missed(t: FixedLagTables, way: Any) -> Any:
+def steady_missed(t: FixedLagTables, way: int) -> int:
     """How far a model's only lag falls short of a move in its first sample."""
     bits = t.led.bits[0]
     return nearest(scaled(t.led, 0, way << bits, t.led.theta), bits)
@@ -238,8 +238,8 @@ def steady_missed(t: FixedLagTables, way: Any) -> Any:
 
 @jit
 def steady_solve(
-    t: FixedLagTables, s: FixedLagMemory, y: Any, moved: Any, rises: int, applied: Any, little: Any
-) -> tuple[Any, Any]:
+    t: FixedLagTables, s: FixedLagMemory, y: int, moved: int, rises: int, applied: int, little: int
+) -> tuple[int, int]:
     """As in floating point; an input that is kept has no move."""
     bits = t.led.bits[0]
     way = y - (s.led.asked[0] >> bits)
@@ -255,7 +255,7 @@ def steady_solve(
 
 
 @jit
-def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: Any, rises: int, applied: Any, little: Any) -> Any:
+def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: int, rises: int, applied: int, little: int) -> int:
     """As in floating point; `little` is at least a drive code, so that rounding to a code leaves the drive ahead."""
     bits = t.led.bits[0]
     x = nearest(s.led.high[0], bits)
@@ -270,7 +270,7 @@ def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: Any, rises: int, applie
 
 
 @jit
-def steady_absorb(s: FixedLagMemory, before: Any) -> None:
+def steady_absorb(s: FixedLagMemory, before: int) -> None:
     """The lag has followed; rounding loses nothing that could take it back."""
 
 
@@ -279,8 +279,8 @@ def steady_absorb(s: FixedLagMemory, before: Any) -> None:
 
 @jit
 def braked(
-    t: FixedLagTables, s: FixedLagMemory, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any
-) -> Any:
+    t: FixedLagTables, s: FixedLagMemory, near: int, short: int, falling: int, rising: int, code: int, drop: int
+) -> int:
     """As in floating point; `code`: a drive code; all arguments are signals; the search drops `drop` bits."""
     bits = t.led.bits[0]
     missed = s.led.earlier[0] - s.led.wanted[0]
@@ -304,7 +304,7 @@ def braked(
 
 
 @jit
-def braked_over(t: FixedLagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
+def braked_over(t: FixedLagTables, size: int, lead: int, back: int, room: int, drop: int) -> int:
     """As in floating point, in the coarse numbers of the search."""
     margin = back >> 1
     most = coarsely(t, size, drop) if size <= margin else size
@@ -317,7 +317,7 @@ def braked_over(t: FixedLagTables, size: Any, lead: Any, back: Any, room: Any, d
 
 
 @jit
-def braked_lead(size: Any, lead: Any, margin: Any, way: Any) -> Any:
+def braked_lead(size: int, lead: int, margin: int, way: int) -> int:
     """The largest lead, up to `lead`, with which the lag gains no more than `size`, where `way` is back/(1 - E)."""
     limit = way * (2 * size)
     if lead <= size or (lead + margin) * (lead + margin) <= limit:
@@ -333,7 +333,7 @@ def braked_lead(size: Any, lead: Any, margin: Any, way: Any) -> Any:
 
 
 @jit
-def coarse(x: Any, drop: Any) -> Any:
+def coarse(x: int, drop: int) -> int:
     """A signal as a coarse number of the search."""
     x = x >> drop
     if x > COARSE:
@@ -342,7 +342,7 @@ def coarse(x: Any, drop: Any) -> Any:
 
 
 @jit
-def coarsely(t: FixedLagTables, x: Any, drop: Any) -> Any:
+def coarsely(t: FixedLagTables, x: int, drop: int) -> int:
     """`x/(1 - E)` in coarse numbers."""
     return coarse(scaled(t.led, 0, x << (t.led.bits[0] + drop), t.led.inverse_rate), drop)
 

@@ -8,16 +8,15 @@ with the motion. Only the forward operator has it: the zeros of a second-order s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Kind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import zero
@@ -122,14 +121,8 @@ def tables(modes: Sequence[ModeNumbers], about: FloatSurroundings) -> ModeTable:
     return ModeTable.of(rows, rows.dtype)
 
 
-def constants(t: ModeTable) -> Iterator[Constants]:
-    """The numbers of each mode."""
-    for row in t:
-        yield Constants(KIND, row, (6, 0))
-
-
 @jit
-def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
     s.before[j] = x
     s.off[j] = zero(x)
@@ -138,7 +131,7 @@ def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG00
 
 
 @jit
-def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:
+def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
     """The input is x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
@@ -149,7 +142,7 @@ def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:
     return x + s.off[j]
 
 
-ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants, tables, kinds=(KIND,))
+ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(KIND, 6), tables, kinds=(KIND,))
 
 PART = ChainPart(
     "mode", "resonance", Place.LINEAR, called("resonance", lambda effect: effect.block is None),

@@ -7,15 +7,13 @@ the sample rate that is a small factor, with 31 bits of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Factor, Struct, UInt8, memory_of
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import ModeNumbers, ModeState
@@ -39,12 +37,6 @@ class FixedModeTable(Struct):
 
 
 KIND = replace(compensator.KIND, table=FixedModeTable)
-
-
-def constants(t: FixedModeTable) -> Iterator[Constants]:
-    """The numbers of each mode."""
-    for row in t:
-        yield Constants(KIND, row, (12, 0))
 
 
 def largest_state(one: ModeNumbers, size: float) -> float:
@@ -104,19 +96,19 @@ mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 
 @jit
-def scaled(t: FixedModeTable, j: int, x: Any, by: Factor) -> Any:
+def scaled(t: FixedModeTable, j: int, x: int, by: Factor) -> int:
     """A number of a state's units times a factor of mode j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def entered(t: FixedModeTable, j: int, change: Any, by: Factor) -> Any:
+def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
     """A change of the input times a factor of mode j, in a state's units."""
     return times(change, by.mantissa[j], by.shift[j]) << t.lift[j]
 
 
 @jit
-def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: Any) -> Any:
+def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
     """The input is x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
@@ -129,7 +121,7 @@ def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: Any) -> Any:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants,
+    Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(KIND, 12),
     lambda modes, _: FixedModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
     kinds=(KIND,),

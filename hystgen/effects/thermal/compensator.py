@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import N, Scalar, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Constants, Kind, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 # ---------------------------------------------------------------- gain.c
 
@@ -61,12 +61,6 @@ class GainState(Struct):
 
 
 KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
-
-
-def constants(t: GainNumbers) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    for row in t:
-        yield Constants(KIND, row, (1, 1))
 
 
 @dataclass(frozen=True)
@@ -135,7 +129,7 @@ def gain_reset(t: GainNumbers, s: GainState, j: int) -> None:
 
 
 @jit
-def gain_set(t: GainNumbers, s: GainState, j: int, gain: Any) -> bool:
+def gain_set(t: GainNumbers, s: GainState, j: int, gain: Scalar) -> bool:
     """Set the gain. Returns whether it had to be limited."""
     inside = gain
     if inside < t.least[j]:
@@ -148,7 +142,7 @@ def gain_set(t: GainNumbers, s: GainState, j: int, gain: Any) -> bool:
 
 
 @jit
-def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Any) -> bool:
+def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Scalar) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     inside = temperature
     if inside < t.coldest[j]:
@@ -162,13 +156,13 @@ def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Any) -> bool:
 
 
 @jit(inline=True)
-def gain_solve(t: GainNumbers, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: GainNumbers, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s.offset[j]) * s.inverse[j]
 
 
 @jit(inline=True)
-def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.gain[j] * x + s.offset[j]
 
@@ -270,11 +264,6 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
         return []
     half = 0.5 * reach(effect, ends) / FRICTION_PLAYS
     return [(2 * i + 1) * half for i in range(FRICTION_PLAYS)]
-
-
-def firsts(rows: Sequence[Sequence[Any]]) -> Counts:
-    """Where the thresholds of each block begin, and those of the last one end."""
-    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
 
 
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
@@ -402,15 +391,9 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     return HeatTables(
         HeatNumbers.of([(*row[:-2], n, *row[-2:]) for row, n in zip(rows, turns, strict=True)], rows.dtype),
         FrictionTable.of([(len(each),) for each in widths]),
-        firsts(widths),
+        firsts(map(len, widths)),
         FrictionPlay.of(play, play.dtype),
     )
-
-
-def heat_constants(t: HeatTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row in t.block:
-        yield Constants(HEAT_KIND, row, (7 + 2 * int(row["turns"]), 1))
 
 
 @jit
@@ -425,14 +408,14 @@ def heat_reset(t: HeatTables, s: HeatMemory, j: int) -> None:
 
 
 @jit
-def heat_way(before: Any, v: Any) -> Any:
+def heat_way(before: N, v: N) -> N:
     """The move of the drive's signed square."""
     way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
     return way if way >= zero(v) else -way
 
 
 @jit
-def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None:
+def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> None:
     """The drive has moved to v."""
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     high = s.block.high[j]
@@ -442,7 +425,7 @@ def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None
     s.block.low[j] = change - (following - high)
     rise = t.block.hottest[j] if following > t.block.hottest[j] else following
     gain = t.block.one[j] + t.block.per_degree[j] * rise
-    inverse = s.block.inverse[j]
+    inverse: Scalar = s.block.inverse[j]
     for _ in range(t.block.turns[j]):
         inverse = inverse * (t.block.two[j] - gain * inverse)
     s.block.gain[j] = gain
@@ -451,28 +434,28 @@ def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None
 
 
 @jit(inline=True)
-def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s.block.offset[j]) * s.block.inverse[j]
 
 
 @jit(inline=True)
-def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.block.gain[j] * x + s.block.offset[j]
 
 
 # ---------------------------------------------------------------- friction.c
 
-def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
-    """The rubbing plays of each block; None where none rub."""
+def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
+    """The rubbing plays of each block, `each` with so many products; None where none rub."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])
-        yield Constants(FRICTION_KIND, row, (n, 0), t.play[first : first + n]) if n else None
+        yield Constants(kind, row, (each * n, 0), t.play[first : first + n]) if n else None
 
 
 @jit
-def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
     """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
     threshold as an odd multiple of the first. Where a play stays, wider ones do too."""
     one = t.block.one[j]
@@ -540,11 +523,11 @@ class UnevenHeat:
 
 ARITHMETIC = Realized(
     Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, tables, kinds=(KIND,),
+    numbered(KIND, 1, 1), tables, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
     Verbs(memory_of(HeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
+    numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 
 GAIN_PART = ChainPart(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
@@ -32,10 +33,11 @@ from hystgen.effects.thermal.compensator import (
     FrictionTable,
     GainState,
     Warm,
+    heat_way,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, firsts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain linear in a temperature: one product."""
@@ -63,11 +65,6 @@ class FixedGainTable(Struct):
 
 
 KIND = replace(floating.KIND, table=FixedGainTable)
-
-
-def constants(t: FixedGainTable) -> Iterator[Constants]:
-    """The numbers of each gain."""
-    yield from (Constants(KIND, row, (2, 2)) for row in t)
 
 
 def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
@@ -128,7 +125,7 @@ def gain_reset(t: FixedGainTable, s: GainState, j: int) -> None:  # noqa: ARG001
 
 
 @jit
-def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool:
+def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: int) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     given = temperature << t.bits[j]
     inside = given
@@ -150,13 +147,13 @@ def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool
 
 
 @jit
-def gain_solve(t: FixedGainTable, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: FixedGainTable, s: GainState, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s.offset[j], s.inverse[j], GAIN_BITS)
 
 
 @jit
-def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.gain[j], GAIN_BITS) + s.offset[j]
 
@@ -290,15 +287,9 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
     return FixedHeatTables(
         FixedHeatTable.of([one.table for one in rows]),
         FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
-        floating.firsts([one.thresholds for one in rows]),
+        firsts(len(one.thresholds) for one in rows),
         FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
-
-
-def heat_constants(t: FixedHeatTables) -> Iterator[Constants]:
-    """The numbers of each block."""
-    for row in t.block:
-        yield Constants(HEAT_KIND, row, (12 + 2 * int(row["turns"]), 2))
 
 
 @jit
@@ -312,14 +303,7 @@ def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa:
 
 
 @jit
-def heat_way(before: Any, v: Any) -> Any:
-    """The move of the drive's signed square."""
-    way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
-    return way if way >= 0 else -way
-
-
-@jit
-def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> None:
+def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> None:
     """The drive has moved to v."""
     n = t.block
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
@@ -339,13 +323,13 @@ def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: An
 
 
 @jit
-def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s.block.offset[j], s.block.inverse[j], GAIN_BITS)
 
 
 @jit
-def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.block.gain[j], GAIN_BITS) + s.block.offset[j]
 
@@ -355,15 +339,8 @@ def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: Any) -> Any: 
 STATE_BITS = 31
 """Bits of a rubbing play, without its sign: a drive has 15 or 31 of them with it."""
 
-def friction_constants(t: FixedHeatTables) -> Iterator[Constants | None]:
-    """The rubbing plays of each block; None where none rub."""
-    for row, first in zip(t.friction, t.first, strict=False):
-        n = int(row["n"])
-        yield Constants(FRICTION_KIND, row, (2 * n, 0), t.play[first : first + n]) if n else None
-
-
 @jit
-def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> int:
     """As in floating point."""
     bits = t.friction.bits[j]
     if not s.friction.begun[j]:
@@ -391,9 +368,10 @@ def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v
 
 ARITHMETIC = Realized(
     Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, made, formats, kinds=(KIND,),
+    numbered(KIND, 2, 2), made, formats, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
     Verbs(memory_of(FixedHeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND), friction_constants,
+    numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
+    functools.partial(floating.friction_constants, kind=FRICTION_KIND, each=2),
 )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.front.stage import StageTables
 
 
 @jit
-def dead_zone(t: StageTables, first: int, n: int, x: Any, inverse: int) -> Any:
+def dead_zone(t: StageTables, first: int, n: int, x: Scalar, inverse: int) -> Scalar:
     """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map, swapped."""
     d = t.stage_data
     breaks = first + n * inverse

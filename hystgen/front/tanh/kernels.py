@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.structures import NumberArray
 
 __all__ = [
     "ATANH_MAX_ULP",
@@ -28,8 +29,7 @@ __all__ = [
     "tanh",
 ]
 
-Real = np.floating
-Reals = npt.NDArray[Real]
+Reals = NumberArray
 
 #: Worst error of `tanh` and `atanh` in ulp of the true value: float32 over all arguments, float64 a bound.
 TANH_MAX_ULP = {"float32": 0.78, "float64": 0.86}
@@ -62,7 +62,7 @@ class AtanhTables(NamedTuple):
 
 
 @jit
-def tanh(x: Real, t: TanhTables) -> Real:
+def tanh(x: Scalar, t: TanhTables) -> Scalar:
     """Hyperbolic tangent of one number, with the bits of `hystgen_tanh`.
 
     `x`: numpy scalar of the tables' format, no unit; returns the same format. Infinities give +-1, NaN gives 1;
@@ -73,11 +73,11 @@ def tanh(x: Real, t: TanhTables) -> Real:
         return x
     if a < t.knot[0]:
         z = x * x
-        p: Real = t.odd[len(t.odd) - 1]
+        p: Scalar = t.odd[len(t.odd) - 1]
         for n in range(len(t.odd) - 1, 0, -1):
             p = t.odd[n - 1] + z * p
         return x + x * (z * p)
-    y: Real = t.one[0]
+    y: Scalar = t.one[0]
     if a < t.bound[1]:
         i = 0
         step = len(t.knot) // 2
@@ -95,7 +95,7 @@ def tanh(x: Real, t: TanhTables) -> Real:
 
 
 @jit
-def atanh(x: Real, t: AtanhTables) -> Real:
+def atanh(x: Scalar, t: AtanhTables) -> Scalar:
     """Inverse hyperbolic tangent of one number, with the bits of `hystgen_atanh`.
 
     `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Values outside, and NaN, are
@@ -104,7 +104,7 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     a = -x if x < 0 else x
     if a <= t.bound[0]:
         z = x * x
-        p: Real = t.odd[len(t.odd) - 1]
+        p: Scalar = t.odd[len(t.odd) - 1]
         for n in range(len(t.odd) - 1, 0, -1):
             p = t.odd[n - 1] + z * p
         return x + x * (z * p)
@@ -127,18 +127,18 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     e = a - t.offset[j - pieces // 2]
 
     degree = len(t.row) // pieces - 1
-    lower = t.row[i * (degree + 1) + degree]
-    upper = t.row[j * (degree + 1) + degree]
+    lower: Scalar = t.row[i * (degree + 1) + degree]
+    upper: Scalar = t.row[j * (degree + 1) + degree]
     for n in range(degree, 1, -1):
         lower = t.row[i * (degree + 1) + n - 1] + d * lower
         upper = t.row[j * (degree + 1) + n - 1] + e * upper
     start = t.row[j * (degree + 1)] - t.row[i * (degree + 1)]
-    y: Real = t.number[k] * t.half_log2[0] + (start + (e * upper - d * lower))
+    y: Scalar = t.number[k] * t.half_log2[0] + (start + (e * upper - d * lower))
     return -y if x < 0 else y
 
 
 def _array(values: list[float], dtype: npt.DTypeLike) -> Reals:
-    array: Reals = np.array(values, dtype=dtype)
+    array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
 
@@ -286,5 +286,5 @@ TANH_TABLES = {"float32": _TANH_FLOAT32, "float64": _TANH_FLOAT64}
 ATANH_TABLES = {"float32": _ATANH_FLOAT32, "float64": _ATANH_FLOAT64}
 """Constants of `atanh` in each format; read-only arrays."""
 
-SCALAR = TanhTables(*map(np.ndarray.tolist, _TANH_FLOAT64)), AtanhTables(*map(np.ndarray.tolist, _ATANH_FLOAT64))
+SCALAR = TanhTables(*(x.tolist() for x in _TANH_FLOAT64)), AtanhTables(*(x.tolist() for x in _ATANH_FLOAT64))
 """Constants of both in float64 as Python floats, which compute the same bits as numpy's scalars."""

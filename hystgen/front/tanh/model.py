@@ -19,12 +19,12 @@ Branch = tuple[float, float, float, float]
 
 def _tanh(x: float) -> float:
     """As compiled code computes it, on every machine."""
-    return float(kernels.tanh.py_func(float(x), kernels.SCALAR[0]))  # type: ignore[arg-type]
+    return float(kernels.tanh.py_func(float(x), kernels.SCALAR[0]))
 
 
 def _atanh(x: float) -> float:
     """As compiled code computes it, on every machine."""
-    return float(kernels.atanh.py_func(float(x), kernels.SCALAR[1]))  # type: ignore[arg-type]
+    return float(kernels.atanh.py_func(float(x), kernels.SCALAR[1]))
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Flag, Int32, Int64, Struct
@@ -14,7 +15,7 @@ from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepS
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
-Kink = tuple[Any, Any, int, int]
+Kink = tuple[int, int, int, int]
 """`hystgen_kink_t`: output and input along the present move, plays that follow from there on, corners that hold
 the others."""
 
@@ -40,14 +41,14 @@ class FixedMemory(NamedTuple):
     corner: FixedCorner  # (n)
 
 
-def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
+def new_fixed_memory(plays: int, dtype: DTypeLike = np.int64) -> FixedMemory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return FixedMemory(here, undo, StepState.zeros(1, dtype), FixedCorner.zeros(max(plays, 1), dtype))
 
 
 @jit(inline=True)
-def along(m: FixedMemory, x: Any) -> Any:
+def along(m: FixedMemory, x: int) -> int:
     """x as seen along the present move: a falling move is a rising one with all signs changed."""
     return x if m.here.rising[0] else -x
 
@@ -64,7 +65,7 @@ def leave_corner(m: FixedMemory) -> None:
 
 
 @jit
-def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> Any:
+def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> int:
     """Where play k of a corner's block begins to follow, along the present move."""
     if by_output:
         return along(m, m.corner.output[c]) + (0 if m.corner.rose[c] == m.here.rising[0] else t.reach[k])
@@ -81,7 +82,7 @@ def turn_back(m: FixedMemory) -> None:
 
 
 @jit
-def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
+def find(t: FixedPlayTables, m: FixedMemory, to: int, by_output: bool) -> Kink:
     """The last kink before `to`, an output or input along the move: where another play begins to follow, or here."""
     c = -1
     low = 0
@@ -114,7 +115,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
 
 
 @jit
-def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
+def find_input(t: FixedPlayTables, m: FixedMemory, to: int) -> Kink:
     """The same for any move to an input. May turn back, but moves nothing."""
     if along(m, to - m.here.input[0]) < 0:
         turn_back(m)
@@ -122,7 +123,7 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
 
 
 @jit
-def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
+def go_on(m: FixedMemory, kink: Kink, to: int, moved: int) -> None:
     """Move the plays to an input short of the next kink; `moved` is the output since the last one."""
     m.here.output[0] = along(m, kink[0] + moved)
     m.here.input[0] = to
@@ -131,21 +132,21 @@ def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
 
 
 @jit
-def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
     """Output gained between a kink and the input `to`; -1 if `to` lies before the kink."""
     way = along(m, to) - kink[1]
     return -1 if way < 0 else t.slope[kink[2] + 1] * way
 
 
 @jit
-def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
+def move_to_input(t: FixedPlayTables, m: FixedMemory, to: int) -> None:
     """Move the plays to any input."""
     kink = find_input(t, m, to)
     go_on(m, kink, to, gained(t, m, kink, to))
 
 
 @jit
-def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
+def next_input(t: FixedPlayTables, m: FixedMemory) -> int:
     """Input at which another play begins to follow the present move, or the largest input."""
     x = INPUT_MOST
     if m.here.depth[0] > 0:
@@ -155,7 +156,7 @@ def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
 
 
 @jit(inline=True)
-def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
+def plays_step(t: FixedPlayTables, m: FixedMemory, to: int) -> int:
     """The sum of the plays at the next input."""
     at = m.here.input[0]
     if at < to < m.step.next[0] if m.here.rising[0] else m.step.next[0] < to < at:
@@ -168,7 +169,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
 
 
 @jit
-def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
     """The input, at most a little outside the range, that gives `to`, an output beyond a kink along the move."""
     x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.here.rising[0] else t.limits[MARGIN] - t.limits[PLAY_MIN]
@@ -176,7 +177,7 @@ def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
 
 
 @jit
-def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
+def solve(t: FixedPlayTables, m: FixedMemory, output: int, following: int) -> tuple[int, Kink]:
     """The input for `output`, at most a little outside the range, and the kink from which it is counted.
 
     May turn back, but moves nothing. The same plays are known to follow up to the output `following`, along the move.
@@ -193,13 +194,13 @@ def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tu
 
 
 @jit
-def next_output(t: FixedPlayTables, m: FixedMemory, kink: Kink) -> Any:
+def next_output(t: FixedPlayTables, m: FixedMemory, kink: Kink) -> int:
     """Output, along the present move, at which another play begins to follow after a kink."""
     return begins(t, m, kink[3] - 1, kink[2] + 1, True) if kink[3] > 0 else FAR
 
 
 @jit
-def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
     """Move the plays to an input near the one solved for from a kink. Returns the output, along the move, at which
     another play begins to follow."""
     following = next_output(t, m, kink)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from hystgen.basics.jit import jit
+from numpy.typing import DTypeLike
+
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, TwoReals
 from hystgen.plays.slots import Reals, StepState
 
@@ -87,7 +89,7 @@ class Memory(NamedTuple):
     corner: Corner  # (n + 1)
 
 
-def new_memory(plays: int, dtype: Any) -> Memory:
+def new_memory(plays: int, dtype: DTypeLike) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return Memory(here, undo, PlaysState.zeros(1, dtype), StepState.zeros(1, dtype), Corner.zeros(plays + 1, dtype))
@@ -104,7 +106,7 @@ def copy_place(to: PlaceState, source: PlaceState) -> None:
 
 
 @jit(inline=True)
-def along(m: Memory, x: Any) -> Any:
+def along(m: Memory, x: Scalar) -> Scalar:
     """x as seen along the present move: a falling move is a rising one with all signs changed."""
     return m.plays.sign[0] * x
 
@@ -146,7 +148,7 @@ def turn_back(t: Curve, m: Memory) -> None:
 
 
 @jit
-def find_segment(step: Reals, k: int, end: int, way: Any) -> int:
+def find_segment(step: Reals, k: int, end: int, way: Scalar) -> int:
     """The last of segments k .. end - 1 that begins before `way`; segment k does. `step`: all ways, or all reaches."""
     middle = (k + end) // 2
     while middle > k:
@@ -159,12 +161,12 @@ def find_segment(step: Reals, k: int, end: int, way: Any) -> int:
 
 
 @jit
-def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
+def stop_in_block(t: Curve, m: Memory, output: Scalar, to: Scalar) -> None:
     """End the move in the top corner's block: where the sum is `output`, or at `to` if that comes first."""
     c = m.here.depth[0] - 1
     rising = m.here.rising[0]
     reach = along(m, output - m.corner.output[c])
-    x = m.corner.passed[c, rising]
+    x: Scalar = m.corner.passed[c, rising]
     k = m.here.k[0]
     if m.corner.rose[c] != rising:
         k = find_segment(t.reach, k, m.corner.top[c], reach)
@@ -178,7 +180,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
 
 
 @jit
-def move_to_output(t: Curve, m: Memory, output: Any) -> None:
+def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
     """Move the plays to where their sum is `output`, up to rounding."""
     if along(m, output) < along(m, m.here.output[0]):
         turn_back(t, m)
@@ -197,7 +199,7 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
 
 
 @jit
-def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
+def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
     """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
     if along(m, to) < along(m, m.here.input[0]):
         turn_back(t, m)
@@ -216,7 +218,7 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
         m.here.depth[0] = passed
     c = m.here.depth[0] - 1
     k = m.here.k[0]
-    cap = m.corner.passed[c, rising]
+    cap: Scalar = m.corner.passed[c, rising]
     after = cap
     begin = cap
     y = along(m, m.corner.output[c])
@@ -254,7 +256,7 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
 
 
 @jit
-def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
+def move_in_block(t: Curve, m: Memory, to: Scalar) -> bool:
     """Move on to an input short of CAP: more plays of the block follow. False if a search would be faster."""
     way = along(m, to - m.plays.from_input[0])
     k = m.here.k[0] + 1
@@ -276,7 +278,7 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
 
 
 @jit(inline=True)
-def plays_step(t: Curve, m: Memory, to: Any) -> Any:
+def plays_step(t: Curve, m: Memory, to: Scalar) -> Scalar:
     """The sum of the plays at the next input; a NaN moves nothing."""
     rising = m.here.rising[0]
     at = m.here.input[0]
@@ -304,12 +306,12 @@ def start(t: Curve, m: Memory, s: Start) -> None:
     m.corner.rose[0] = BOTTOM
     m.here.depth[0] = 1
     for k in range(s.top - 1, 0, -1):
-        center = s.center[s.step * k]
+        c = s.step * k
         m.here.k[0] = k
         m.here.rising[0] = 1 if k <= s.risen else 0
         m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
-        m.here.input[0] = center[0] + along(m, t.way[k] * t.literal.half[0])
-        m.here.output[0] = center[1] + along(m, t.reach[k] * t.literal.half[0])
+        m.here.input[0] = s.center[c, 0] + along(m, t.way[k] * t.literal.half[0])
+        m.here.output[0] = s.center[c, 1] + along(m, t.reach[k] * t.literal.half[0])
         leave_corner(t, m)
     m.here.k[0] = 0
     m.here.rising[0] = 1
