@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
+from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, remarks, tables
@@ -70,7 +71,7 @@ Answers: TypeAlias = tuple[NDArray[Any], list[str]]
 """Samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Model:
     """A model as given by its parameter file: `parameters`, and the mathematics in `cascade`."""
 
@@ -424,7 +425,7 @@ class Model:
         return Compensator(self.chain, self.parameters.emit.compensation)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class InverseModel:
     """The compensator of a model: reference in, drive out."""
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import Compensator, Form, Glue, Names, Numbers, Table, Writer

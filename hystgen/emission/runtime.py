@@ -13,7 +13,6 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
@@ -21,6 +20,7 @@ from typing import ClassVar
 import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
+from hystgen.basics.frozen import dataclass
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
