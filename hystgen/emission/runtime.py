@@ -438,10 +438,11 @@ def split_pieces(source: str) -> list[Piece]:
         if inside:
             _, comment_ends, code = line.partition("*/")
             comment = not comment_ends
-        code = re.sub(r"/\*.*?\*/", "", code)
         if "/*" in code:
-            code, comment = code.partition("/*")[0], True
-        constant = not depth and bool(re.match(r"#define \w+ .", line))
+            code = _COMMENT.sub("", code)
+            code, opened, _ = code.partition("/*")
+            comment = comment or bool(opened)
+        constant = not depth and line.startswith("#define") and bool(re.match(r"#define \w+ .", line))
         if not depth and not constant and line.startswith("#"):
             lines = []
             continue
@@ -450,19 +451,17 @@ def split_pieces(source: str) -> list[Piece]:
             continue
         lines.append(line)
         depth += code.count("{") - code.count("}")
-        if constant or (not depth and re.search(r"[};]\s*$", code)):
+        if constant or (not depth and code.rstrip().endswith(("}", ";"))):
             pieces.append(_piece("\n".join(lines) + "\n"))
             lines = []
     return pieces
 
 
-def _defined_name(text: str) -> str:
-    code = _COMMENT.sub("", text)
-    typedef = re.search(r"}\s*(hystgen_\w+);\s*$", code)
-    if typedef and "typedef" in code:
+def _defined_name(code: str) -> str:
+    if "typedef" in code and (typedef := re.search(r"}\s*(hystgen_\w+);\s*$", code)):
         return typedef.group(1)
     declared = re.search(r"#define (HYSTGEN_\w+)|(hystgen_\w+)\s*[\[(]", code)
-    assert declared, f"no name in: {text}"
+    assert declared, f"no name in: {code}"
     return declared.group(1) or declared.group(2)
 
 
@@ -525,8 +524,13 @@ def forms(source: str, facts: Collection[str]) -> list[str]:
     ]
 
 
+@functools.cache
+def _pieces_of(file: str, facts: frozenset[str]) -> list[Piece]:
+    return [piece for text in forms(_read(file), facts) for piece in split_pieces(text)]
+
+
 def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
-    return [piece for file in files for text in forms(_read(file), facts) for piece in split_pieces(text)]
+    return [piece for file in files for piece in _pieces_of(file, frozenset(facts))]
 
 
 def kernel_pieces(family: Family) -> list[Piece]:
@@ -589,8 +593,9 @@ def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
 
 
 def _piece(text: str) -> Piece:
-    own = _defined_name(text)
-    return Piece(own, text, frozenset(_NAME.findall(_COMMENT.sub("", text))) - {own})
+    code = _COMMENT.sub("", text)
+    own = _defined_name(code)
+    return Piece(own, text, frozenset(_NAME.findall(code)) - {own})
 
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
