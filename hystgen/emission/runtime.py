@@ -75,8 +75,8 @@ class Family(ABC):
     """An arithmetic in C: its run-time files and its types; `chain`: in a model with effects; `loop`: in a model
     without effects in engine loop.
 
-    `kind`: the kind of arithmetic, in names of files; `ending`: of files whose floating-point names have none;
-    `chain_types`: types of effects; `helpers`: files that several effects call; `curves`: of a memoryless part whose
+    `kind`: the kind of arithmetic, in names of files; `form`: the module of emission that writes it; `ending`: of files
+    whose floating-point names have none; `chain_types`: types of effects; `helpers`: files that several effects call; `curves`: of a memoryless part whose
     stages are not called one by one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less
     stack in separate functions; `opening`: headers before all code of a file, which in a single header stand between
     `opening_apart` and `closing`, so that its user's code is compiled as before.
@@ -87,6 +87,7 @@ class Family(ABC):
     loop: bool = False
 
     kind: ClassVar[str]
+    form: ClassVar[str]
     ending: ClassVar[str]
     moves_apart: ClassVar[bool]
     chain_types: ClassVar[tuple[str, ...]]
@@ -190,7 +191,7 @@ def _apart(holds: bool, otherwise: str = "static ") -> str:
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
-    kind, ending, moves_apart = "float", "", False
+    kind, form, ending, moves_apart = "float", "floating", "", False
     chain_types, curves, codes = CHAIN_TYPES, (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
@@ -221,7 +222,7 @@ class FloatFamily(Family):
 class FixedFamily(Family):
     """Fixed point."""
 
-    kind, ending, moves_apart = "fixed", "_fixed", True
+    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", True
     chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
@@ -348,6 +349,7 @@ class Variant:
         return (f"{corners}forward.c", f"{corners}inverse{kind}.c", f"{corners}start.c")
 
 
+@functools.cache
 def data_folder(name: str) -> Path:
     """`templates`, `c_runtime` or `hystgen`: inside the installed package, or at the top of the checkout."""
     package = Path(__file__).resolve().parent.parent
@@ -721,11 +723,11 @@ def _named(
 ) -> str:
     """The text with the names of a model and of its run time; `carried`: run-time names that the model carries
     itself."""
-    for shared, here in family.signals.items():
-        cast = f"({shared})"
+    signals = family.signals
+    for shared, here in signals.items():
         if here == "hystgen_real_t" and not family.casts:
-            text = text.replace(cast, "")
-        text = re.sub(rf"\b{shared}\b", here, text)
+            text = text.replace(f"({shared})", "")
+    text = _NAME.sub(lambda found: signals.get(found[0], found[0]), text)
     for kind in SUMS:
         if (here := family.alike(kind)) != kind:
             text = text.replace(f"(hystgen_{kind})", "").replace(f"hystgen_{kind}", f"hystgen_{here}")

@@ -58,6 +58,11 @@ class Sample:
     answer: str
     status: int
 
+    @property
+    def row(self) -> str:
+        """The sample in C."""
+        return f"{{'{self.call}', {self.argument}, {self.answer}, {self.status}u}}"
+
 
 @dataclass(frozen=True)
 class Operator:
