@@ -217,10 +217,7 @@ class Model:
         return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
 
     def engine(
-        self,
-        engine: str | None = None,
-        operator: str | None = None,
-        arithmetic: str | None = None,
+        self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None,
         optimize: str | None = None,
     ) -> str:
         """'corners' or 'loop': the given one, or else the parameter file's, with `auto` decided for `optimize`."""
@@ -270,14 +267,8 @@ class Model:
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
-        self,
-        v: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = False,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
@@ -297,14 +288,8 @@ class Model:
         return y
 
     def answers(
-        self,
-        v: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = False,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         if not self.effects:
@@ -323,13 +308,8 @@ class Model:
         return float(cascade.front_inverse(cascade.pi.start[0])) if cascade.start_is_defined else 0.0
 
     def _reference(
-        self,
-        x: ArrayLike,
-        arithmetic: str,
-        engine: str | None,
-        t: ArrayLike | None,
-        extra: Mapping[str, ArrayLike] | None,
-        inverse: bool,
+        self, x: ArrayLike, arithmetic: str, engine: str | None, t: ArrayLike | None,
+        extra: Mapping[str, ArrayLike] | None, inverse: bool,
     ) -> Answers:
         """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
@@ -365,12 +345,8 @@ class Model:
         return found, remarks.forward(samples, (float(ends[0]), float(ends[1])), True, held)
 
     def run(
-        self,
-        v: ArrayLike,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
-        clamp: bool = False,
-        rest: float = 0.0,
+        self, v: ArrayLike, t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
+        clamp: bool = False, rest: float = 0.0,
     ) -> Run:
         """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
         from hystgen.effects import Run
@@ -435,14 +411,8 @@ class InverseModel:
         return f"<InverseModel of {self.forward!r}>"
 
     def simulate(
-        self,
-        u: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = True,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
@@ -462,14 +432,8 @@ class InverseModel:
         return v
 
     def answers(
-        self,
-        u: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = True,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         model = self.forward

@@ -2,96 +2,69 @@
 
 `dataclasses.dataclass(frozen=True)` writes six methods for each class and compiles them, which takes 4.2 million
 instructions; 0.7 million are left here (callgrind, 100 classes of five fields, Python 3.11), and `hystgen emit` of a
-plain model defines 50 classes. Type checkers see the standard decorator. An instance takes longer to make; classes of
-which a command makes more than some thousands are better off with the standard one.
+plain model defines 50 classes. Type checkers see the standard decorator. An instance takes longer to make: a class of
+which a command makes many thousands is better off with the standard one.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import MISSING, Field, FrozenInstanceError, fields
+from dataclasses import MISSING, FrozenInstanceError, fields
 from dataclasses import dataclass as standard
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeVar
-
-T = TypeVar("T")
-
-
-class _Known(NamedTuple):
-    """What the methods of a class know about it."""
-
-    fields: tuple[Field[Any], ...]
-    given: tuple[str, ...]
-    every: frozenset[str]
-    defaults: dict[str, object]
-    compared: tuple[str, ...]
+from typing import TYPE_CHECKING, NoReturn
+from typing import Any as Instance  # of a class that the decorator made, or the class
 
 
-def _init(self: Any, *given: object, **named: object) -> None:
-    known: _Known = self._known
-    values = {**known.defaults, **dict(zip(known.given, given, strict=False)), **named}
-    if len(given) > len(known.given) or values.keys() != known.every or not named.keys().isdisjoint(
-        known.given[: len(given)]
-    ):
+def _init(self: Instance, *given: object, **named: object) -> None:
+    passed = {**dict(zip(self.__match_args__, given, strict=False)), **named}
+    values = {**self._defaults, **passed}
+    if len(passed) < len(given) + len(named) or values.keys() != {*self.__match_args__}:
         inspect.signature(type(self)).bind(*given, **named)  # says what is wrong
     self.__dict__.update(values)
     if hasattr(self, "__post_init__"):
         self.__post_init__()
 
 
-def _repr(self: Any) -> str:
-    shown = ", ".join(f"{each.name}={getattr(self, each.name)!r}" for each in self._known.fields if each.repr)
-    return f"{type(self).__qualname__}({shown})"
+def _signature(of: Instance) -> inspect.Signature:
+    return inspect.Signature([
+        inspect.Parameter(
+            each.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=each.type,
+            default=inspect.Parameter.empty if each.default is MISSING else each.default,
+        )
+        for each in fields(of) if each.init
+    ])
 
 
-def _compared(self: Any) -> tuple[object, ...]:
-    return tuple(getattr(self, name) for name in self._known.compared)
-
-
-def _eq(self: Any, other: object) -> bool:
-    return _compared(self) == _compared(other) if other.__class__ is self.__class__ else NotImplemented
-
-
-def _hash(self: Any) -> int:
-    return hash(_compared(self))
+def _compared(self: Instance) -> tuple[object, ...]:
+    return tuple(getattr(self, each.name) for each in fields(self) if each.compare)
 
 
 def _refuse(_: object, name: str, *__: object) -> NoReturn:
     raise FrozenInstanceError(f"cannot assign to field {name!r}")
 
 
-class _Signature:
-    """The signature of a class, made when somebody asks for it."""
-
-    def __get__(self, _: object, of: Any) -> inspect.Signature:
-        return inspect.Signature([
-            inspect.Parameter(
-                each.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=each.type,
-                default=inspect.Parameter.empty if each.default is MISSING else each.default,
-            )
-            for each in of._known.fields if each.init
-        ])  # fmt: skip
+def _repr(self: Instance) -> str:
+    shown = ", ".join(f"{each.name}={getattr(self, each.name)!r}" for each in fields(self) if each.repr)
+    return f"{type(self).__qualname__}({shown})"
 
 
 _METHODS = {
-    "__init__": _init, "__repr__": _repr, "__eq__": _eq, "__hash__": _hash,
-    "__setattr__": _refuse, "__delattr__": _refuse, "__signature__": _Signature(),
+    "__init__": _init, "__repr__": _repr, "__setattr__": _refuse, "__delattr__": _refuse,
+    "__hash__": lambda self: hash(_compared(self)),
+    "__eq__": lambda self, other: _compared(self) == _compared(other) if type(other) is type(self) else NotImplemented,
+    "__signature__": type("Signature", (), {"__get__": lambda _, __, of: _signature(of)})(),
 }
 
 
-def _frozen(*, frozen: bool) -> Callable[[type[T]], type[T]]:
+def _frozen(*, frozen: bool) -> Instance:
     assert frozen
 
-    def made(cls: Any) -> Any:
-        own = {name: method for name, method in _METHODS.items() if name not in vars(cls)}
+    def made(cls: Instance) -> Instance:
+        for name, method in _METHODS.items():
+            if name not in vars(cls):
+                setattr(cls, name, method)
         found = fields(standard(init=False, repr=False, eq=False)(cls))
-        given = tuple(each.name for each in found if each.init)
-        defaults = {each.name: each.default for each in found if each.default is not MISSING}
-        own["_known"] = _Known(
-            found, given, frozenset(given), defaults, tuple(each.name for each in found if each.compare)
-        )
-        for name, method in own.items():
-            setattr(cls, name, method)
+        cls._defaults = {each.name: each.default for each in found if each.default is not MISSING}
         return cls
 
     return made

@@ -135,9 +135,7 @@ def inverse_clamp(t: Limited, u: Any) -> Any:
 
 
 def first_moves(
-    cascade: StaticModel,
-    limits: tuple[Any, Any],
-    not_above: Callable[[float], tuple[Any, bool]],
+    cascade: StaticModel, limits: tuple[Any, Any], not_above: Callable[[float], tuple[Any, bool]],
     nearest: Callable[[float], Any],
 ) -> tuple[list[Any], list[int]]:
     """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.

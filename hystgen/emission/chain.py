@@ -286,13 +286,8 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
 
 
 def _functions(
-    op: str,
-    t: Shape,
-    before: Sequence[Block] = (),
-    after: Sequence[Block] = (),
-    behind: Sequence[Stage] = (),
-    clocks: Sequence[Block] = (),
-    rubbing: Sequence[Block | None] = (),
+    op: str, t: Shape, before: Sequence[Block] = (), after: Sequence[Block] = (), behind: Sequence[Stage] = (),
+    clocks: Sequence[Block] = (), rubbing: Sequence[Block | None] = (),
 ) -> str:
     """The functions of one operator that name its blocks."""
     inverse = op == "inverse"

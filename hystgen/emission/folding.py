@@ -86,11 +86,8 @@ def parsed(text: str) -> Function | None:
 
 
 def folded(
-    functions: Iterable[Function],
-    kernels: Iterable[Function],
-    wanted: Callable[[dict[str, Function]], Collection[str]],
-    apart: Sequence[str],
-    meaning: Callable[[str], str] = str,
+    functions: Iterable[Function], kernels: Iterable[Function],
+    wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
     """The functions of a model without code that does nothing. `wanted` names those that are called; the rest as in
     `_Folding`."""

@@ -76,10 +76,10 @@ class Family(ABC):
     without effects in engine loop.
 
     `kind`: the kind of arithmetic, in names of files; `form`: the module of emission that writes it; `ending`: of files
-    whose floating-point names have none; `chain_types`: types of effects; `helpers`: files that several effects call; `curves`: of a memoryless part whose
-    stages are not called one by one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less
-    stack in separate functions; `opening`: headers before all code of a file, which in a single header stand between
-    `opening_apart` and `closing`, so that its user's code is compiled as before.
+    whose floating-point names have none; `chain_types`: types of effects; `helpers`: files that several effects call;
+    `curves`: of a memoryless part whose stages are not called one by one; `codes`: of codes; `moves_apart`: whether
+    moving and bending plays takes less stack in separate functions; `opening`: headers before all code of a file, which
+    in a single header stand between `opening_apart` and `closing`, so that its user's code is compiled as before.
     """
 
     arithmetic: Arithmetic
@@ -366,6 +366,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
+        auto_reload=False,
     )
 
 
@@ -422,8 +423,6 @@ _MEMBER = re.compile(
     r"(?: : (?P<bits>\d+))?$"
 )
 _CONSTANT = re.compile(r"^static const (?:hystgen_)?(\w+) \w+((?:\[\d+\])*) = ", re.MULTILINE)
-
-
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
@@ -558,10 +557,7 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant,
-    operators: Iterable[str],
-    glue: str,
-    calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
     own: Sequence[Piece] = (),
 ) -> list[Piece]:
     """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
@@ -689,11 +685,7 @@ def render_operators(
 
 
 def api(
-    operators: Iterable[str],
-    name: str,
-    prefix: str,
-    family: Family,
-    calls: Mapping[str, Iterable[str]],
+    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]],
     documented: Callable[[Sequence[Piece]], Iterable[Piece]],
 ) -> str:
     """Prototypes of a model's functions; `calls`: additional functions by operator; `documented`: puts the

@@ -402,11 +402,7 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
 
 
 def arithmetic(
-    blocks: Sequence[OwnBlock],
-    effects: Sequence[type[Effect]],
-    made: Glue,
-    products: int,
-    tables: Function,
+    blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, products: int, tables: Function,
     formats: Function = lambda one, *_: one,
 ) -> Realized:
     """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications in one of
