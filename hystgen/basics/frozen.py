@@ -18,7 +18,7 @@ from typing import Any as Instance  # of a class that the decorator made, or the
 def _init(self: Instance, *given: object, **named: object) -> None:
     passed = {**dict(zip(self.__match_args__, given, strict=False)), **named}
     values = {**self._defaults, **passed}
-    if len(passed) < len(given) + len(named) or values.keys() != {*self.__match_args__}:
+    if len(passed) < len(given) + len(named) or values.keys() != self._names:
         inspect.signature(type(self)).bind(*given, **named)  # says what is wrong
     self.__dict__.update(values)
     if hasattr(self, "__post_init__"):
@@ -64,6 +64,7 @@ def _frozen(*, frozen: bool) -> Instance:
             if name not in vars(cls):
                 setattr(cls, name, method)
         found = fields(standard(init=False, repr=False, eq=False)(cls))
+        cls._names = frozenset(cls.__match_args__)
         cls._defaults = {each.name: each.default for each in found if each.default is not MISSING}
         return cls
 

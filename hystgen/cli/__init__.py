@@ -13,8 +13,8 @@ from hystgen.basics.version import __version__
 
 OBJECTS = 50_000
 """[objects] made between two searches for garbage. Nearly all objects of a command are classes and functions, which
-stay: with Python's 700, `hystgen emit` of a plain model spends 70 of 1,666 million instructions, and 50 of 340 ms, on
-looking at them again and again."""
+stay: with Python's 700, `hystgen emit` of a plain model spends 22 of 1,526 million instructions on looking at them
+again and again (callgrind, Python 3.11)."""
 
 
 class _Commands(console.Commands):
