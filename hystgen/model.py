@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
+from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, remarks, tables
@@ -70,7 +71,7 @@ Answers: TypeAlias = tuple[NDArray[Any], list[str]]
 """Output samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Model:
     """A model as given by its parameter file: `parameters`, and the mathematics in `cascade`."""
 
@@ -216,10 +217,7 @@ class Model:
         return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
 
     def engine(
-        self,
-        engine: str | None = None,
-        operator: str | None = None,
-        arithmetic: str | None = None,
+        self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None,
         optimize: str | None = None,
     ) -> str:
         """'corners' or 'loop': the given engine, else the parameter file's; `auto` picks the better for `optimize`."""
@@ -269,14 +267,8 @@ class Model:
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
-        self,
-        v: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = False,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
@@ -297,14 +289,8 @@ class Model:
         return y
 
     def answers(
-        self,
-        v: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = False,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         if not self.effects:
@@ -323,13 +309,8 @@ class Model:
         return float(cascade.front_inverse(cascade.pi.start[0])) if cascade.start_is_defined else 0.0
 
     def _reference(
-        self,
-        x: ArrayLike,
-        arithmetic: str,
-        engine: str | None,
-        t: ArrayLike | None,
-        extra: Mapping[str, ArrayLike] | None,
-        inverse: bool,
+        self, x: ArrayLike, arithmetic: str, engine: str | None, t: ArrayLike | None,
+        extra: Mapping[str, ArrayLike] | None, inverse: bool,
     ) -> Answers:
         """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
@@ -365,12 +346,8 @@ class Model:
         return found, remarks.forward(samples, (float(ends[0]), float(ends[1])), True, held)
 
     def run(
-        self,
-        v: ArrayLike,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
-        clamp: bool = False,
-        rest: float = 0.0,
+        self, v: ArrayLike, t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
+        clamp: bool = False, rest: float = 0.0,
     ) -> Run:
         """The record that `chain.simulate` takes; arguments as for `simulate`, and a pause of `rest` s before it."""
         from hystgen.effects import Run
@@ -425,7 +402,7 @@ class Model:
         return Compensator(self.chain, self.parameters.emit.compensation)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class InverseModel:
     """The compensator of a model: reference in, drive out."""
 
@@ -435,14 +412,8 @@ class InverseModel:
         return f"<InverseModel of {self.forward!r}>"
 
     def simulate(
-        self,
-        u: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = True,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
@@ -461,14 +432,8 @@ class InverseModel:
         return v
 
     def answers(
-        self,
-        u: ArrayLike,
-        arithmetic: str | None = None,
-        clamp: bool = True,
-        engine: str | None = None,
-        *,
-        t: ArrayLike | None = None,
-        extra: Mapping[str, ArrayLike] | None = None,
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
+        t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         model = self.forward

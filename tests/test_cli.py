@@ -573,6 +573,7 @@ def test_messages_reach_the_shell(installed: str) -> None:
     assert not {"numba", "scipy", "matplotlib", "pandas", "cffi", "rich"} & set(loaded), "emit starts fast"
     of_effects = [name for name in loaded if name.startswith(("hystgen.effects.", "hystgen.compensator.chain"))]
     assert of_effects == [], "a plain model has no effect"
+    assert not {"hystgen.compensator.fixed_tables", "hystgen.emission.fixed", "hystgen.cli.verify"} & set(loaded)
     file = ("--json", "no/such/folder/report.json", "--compiler", installed)
     assert "no/such/folder" in process("verify", "stage.yaml", *file, code=2).stderr
 

@@ -1078,6 +1078,20 @@ def test_loading_a_plain_model_imports_no_effect() -> None:
     assert not {"hystgen.effects.base", "hystgen.effects.lag.model", "numpy", "numba", "scipy"} & set(loaded)
 
 
+def test_a_model_imports_the_folders_of_its_effects_alone(tmp_path: Path) -> None:
+    """From the file to the simulated displacement; the inverse of a chain still has every block of the catalogue."""
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        "hystgen: 1\nname: a\ninput_range: [0, 1]\nmodel:\n  pi: {thresholds: [0, 0.2], weights: [1, 1]}\n"
+        "  effects:\n    - {name: creep, time_constants: [1], weights: [0.1]}\n"
+    )
+    code = f"import sys, hystgen; hystgen.load({str(path)!r}).simulate([0.0, 0.5], t=[0.0, 1.0]); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = {name.split(".")[2] for name in run.stdout.split() if name.startswith("hystgen.effects.")}
+    assert loaded & set(effects.CATALOGUE) == {"creep"}
+    assert not {name for name in run.stdout.split() if name.startswith("hystgen.compensator.chain")}
+
+
 # Effects of the user's own --------------------------------------------------------------------------------
 
 EXAMPLE = Path(__file__).parent / "neighbour.py"

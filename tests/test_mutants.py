@@ -64,6 +64,7 @@ def forget() -> None:
     """What has been read of the sources."""
     runtime._environment.cache_clear()
     runtime._read.cache_clear()
+    runtime._pieces_of.cache_clear()
 
 
 def verify(name: str, arithmetic: str, engine: str) -> Report:

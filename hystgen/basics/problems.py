@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+
+from hystgen.basics.frozen import dataclass
 
 Path = tuple[str | int, ...]
 """Path of a value in the file: keys and list indices from the top level down."""

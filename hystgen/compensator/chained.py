@@ -223,10 +223,7 @@ class Compensator:
         return self.answers(reference, ends, asked)[0]
 
     def answers(
-        self,
-        reference: Run,
-        ends: tuple[float, float],
-        asked: NDArray[np.bool_] | None = None,
+        self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None,
         held: NDArray[np.bool_] | None = None,
     ) -> tuple[Array, Array]:
         """Drives (N,) within `ends` for the reference in `reference.v`, and how far each was limited to them.

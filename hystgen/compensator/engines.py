@@ -93,15 +93,13 @@ def dearest(
     return found
 
 
-def _between(measured: Mapping[int, Mapping[str, Dearest]], n: int, core: str) -> Dearest:
-    """The figures for `n` plays, interpolated linearly between the rows on either side."""
+def _between(measured: Mapping[int, Mapping[str, str]], n: int, core: str) -> Dearest:
+    """The figures for `n` plays, interpolated linearly between the rows on either side, or those of the only row."""
     rows = sorted(measured)
-    if len(rows) == 1:
-        return measured[rows[0]][core]
     above = next((at for at in rows[1:] if at >= n), rows[-1])
-    below = rows[rows.index(above) - 1]
-    low, high = measured[below][core], measured[above][core]
-    share = (n - below) / (above - below)
+    below = rows[max(rows.index(above) - 1, 0)]
+    low, high = (Dearest(int(row[core]), int(row[f"{core} stack"])) for row in (measured[below], measured[above]))
+    share = (n - below) / (above - below) if above > below else 0.0
     instructions = round(low.instructions + share * (high.instructions - low.instructions))
     return Dearest(instructions, max(low.stack, high.stack))
 
@@ -126,19 +124,19 @@ def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arith
     for one in operators:
         measured = _instructions()[one, arithmetic, kind, engine]
         costs = measured[max(plays for plays in measured if plays <= cascade.pi.n)]
-        instructions = {core: instructions[core] + costs[core] for core in CORES}
+        instructions = {core: instructions[core] + float(costs[core]) for core in CORES}
     if optimize == "speed":
         return math.prod(instructions.values())
     return code[SMALL] / FLASH + instructions[SMALL] / CYCLES
 
 
 @functools.cache
-def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, float]]]:
-    """Instructions per sample on each core by number of plays, for each operator, arithmetic, kind and engine."""
-    found: dict[tuple[str, str, str, str], dict[int, dict[str, float]]] = {}
+def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, str]]]:
+    """Rows with the instructions per sample by number of plays, for each operator, arithmetic, kind and engine."""
+    found: dict[tuple[str, str, str, str], dict[int, dict[str, str]]] = {}
     for row in _rows("engine_costs.csv"):
         about = (row["operator"], row["arithmetic"], row["kind"], row["engine"])
-        found.setdefault(about, {})[int(row["n"])] = {core: float(row[core]) for core in CORES}
+        found.setdefault(about, {})[int(row["n"])] = row
     return found
 
 
@@ -160,13 +158,12 @@ def _code_sizes() -> dict[tuple[str, str, str, str], dict[str, int]]:
 
 
 @functools.cache
-def _steps() -> dict[tuple[str, str, str, str], dict[int, dict[str, Dearest]]]:
-    """The most expensive sample on each core by number of plays, for each part, arithmetic, engine and operator."""
-    found: dict[tuple[str, str, str, str], dict[int, dict[str, Dearest]]] = {}
+def _steps() -> dict[tuple[str, str, str, str], dict[int, dict[str, str]]]:
+    """Rows with the most expensive sample by number of plays, for each part, arithmetic, engine and operator."""
+    found: dict[tuple[str, str, str, str], dict[int, dict[str, str]]] = {}
     for row in _rows("step_costs.csv"):
         about = (row["part"], row["arithmetic"], row["engine"], row["operator"])
-        figures = {core: Dearest(int(row[core]), int(row[f"{core} stack"])) for core in CORES}
-        found.setdefault(about, {})[int(row["n"])] = figures
+        found.setdefault(about, {})[int(row["n"])] = row
     return found
 
 

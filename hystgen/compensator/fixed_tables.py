@@ -23,7 +23,6 @@ import bisect
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import partial
@@ -32,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.arithmetic import FIXED
+from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import FormatError, Path, counted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import error_bounds, largest_sum
@@ -105,10 +105,7 @@ def reciprocal(slope: int) -> tuple[int, int]:
 
 
 def lsbs(
-    cascade: StaticModel,
-    arithmetic: str,
-    drive_lsb: float | None = None,
-    output_lsb: float | None = None,
+    cascade: StaticModel, arithmetic: str, drive_lsb: float | None = None, output_lsb: float | None = None,
     output_range: tuple[float, float] | None = None,
 ) -> tuple[Fraction, Fraction]:
     """Physical units per drive code and per output code: as given, else the finest that reach the ends of the ranges.
@@ -161,15 +158,8 @@ class Builder:
     """
 
     def __init__(
-        self,
-        cascade: StaticModel,
-        arithmetic: str,
-        engine: str,
-        lsb: tuple[Fraction, Fraction],
-        given: tuple[bool, bool],
-        beyond: int = 0,
-        led: bool = False,
-        bent: float = 0.0,
+        self, cascade: StaticModel, arithmetic: str, engine: str, lsb: tuple[Fraction, Fraction],
+        given: tuple[bool, bool], beyond: int = 0, led: bool = False, bent: float = 0.0,
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
         self.code_max = FIXED[arithmetic].code_max
@@ -642,14 +632,8 @@ class FixedCurve:
     """
 
     def __init__(
-        self,
-        function: Callable[[float], float],
-        domain: tuple[int, int],
-        corners: Sequence[float],
-        degree: int,
-        allowed: float,
-        below: int = 0,
-        edge: tuple[int, int] = (0, 0),
+        self, function: Callable[[float], float], domain: tuple[int, int], corners: Sequence[float], degree: int,
+        allowed: float, below: int = 0, edge: tuple[int, int] = (0, 0),
     ) -> None:
         self.function, self.domain, self.below, self.edge, self.degree = function, domain, below, edge, degree
         self.pieces: list[_Piece] = []

@@ -135,9 +135,7 @@ def inverse_clamp(t: Limited, u: N) -> N:
 
 
 def first_moves(
-    cascade: StaticModel,
-    limits: tuple[Scalar, Scalar],
-    not_above: Callable[[float], tuple[Scalar, bool]],
+    cascade: StaticModel, limits: tuple[Scalar, Scalar], not_above: Callable[[float], tuple[Scalar, bool]],
     nearest: Callable[[float], Scalar],
 ) -> tuple[list[Scalar], list[int]]:
     """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.

@@ -15,18 +15,11 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, jit
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
-from hystgen.compensator import step_fixed, step_float, tables
-from hystgen.compensator.corners import (
-    forward,
-    forward_fixed,
-    inverse,
-    inverse_fixed,
-    inverse_front,
-    inverse_front_fixed,
-)
+from hystgen.compensator import step_float, tables
+from hystgen.compensator.corners import forward, inverse, inverse_front
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
-from hystgen.front import compensator, curve
+from hystgen.front import compensator
 from hystgen.plays import loop
 from hystgen.plays.slots import (
     CODE_MAX,
@@ -51,30 +44,31 @@ class Engines(NamedTuple):
     corners: tuple[tuple[Operations, Operations], tuple[Operations, Operations]]
 
 
-ENGINES = (
-    Engines(
-        compensator, step_float.OPERATIONS,
-        ((forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)),
-    ),
-    Engines(
-        curve, step_fixed.OPERATIONS,
-        ((forward_fixed.OPERATIONS, inverse_fixed.OPERATIONS),
-         (forward_fixed.OPERATIONS, inverse_front_fixed.OPERATIONS)),
-    ),
-)
-"""Floating and fixed point."""
+@functools.cache
+def _engines(fixed: bool) -> Engines:
+    """Those of floating point, or those of fixed point, which are imported when a model has it."""
+    if not fixed:
+        corners = (forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)
+        return Engines(compensator, step_float.OPERATIONS, corners)
+    from hystgen.compensator import step_fixed
+    from hystgen.compensator.corners import forward_fixed, inverse_fixed, inverse_front_fixed
+    from hystgen.front import curve
+
+    forwards = forward_fixed.OPERATIONS
+    corners = (forwards, inverse_fixed.OPERATIONS), (forwards, inverse_front_fixed.OPERATIONS)
+    return Engines(curve, step_fixed.OPERATIONS, corners)
 
 
 def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
     """The module with the functions of the memoryless part, for the arithmetic of given tables."""
-    return ENGINES[t.fixed].front
+    return _engines(t.fixed).front
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
     """The functions of one operator in the bit reference, for the arithmetic and the engine of given tables."""
     fixed = t.fixed
     if isinstance(t, Tables | FixedTables):
-        found = ENGINES[fixed]
+        found = _engines(fixed)
         return (found.loop if t.engine == LOOP else found.corners[t.has_front])[inverse]
     from hystgen.compensator.chain.layout import OwnChainTables
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
-from hystgen.compensator import fixed_tables
 from hystgen.compensator.float_tables import build_float
 from hystgen.compensator.layout import FixedTables, Tables
 
@@ -32,4 +31,6 @@ def build(
     """
     if not ARITHMETICS[arithmetic].fixed:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)
+    from hystgen.compensator import fixed_tables  # late: fractions are slow to import
+
     return fixed_tables.build(cascade, arithmetic, engine, *lsb)[0]

@@ -67,16 +67,9 @@ CATALOGUE = _catalogue()
 """Names of the effects: the folders here, each with a `model` whose `SHAPES` are its classes, the default one first."""
 
 _PLACES = {
-    "About": "base",
-    "Candidate": "base",
-    "Effect": "base",
-    "Place": "base",
-    "Run": "base",
-    "OwnBlock": "kinds",
-    "decays": "base",
-    "follow": "base",
+    **dict.fromkeys(("About", "Candidate", "Effect", "Place", "Run", "decays", "follow"), "base"),
+    **dict.fromkeys(("OwnBlock", "product"), "kinds"),
     "load_user_effects": "user",
-    "product": "kinds",
 }
 
 __all__ = [*_PLACES, "BEND", "CATALOGUE", "FRONTS", "LIMIT", "TOLD_APART", "Unmeasured", "shapes"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hystgen.basics.frozen import dataclass
 from hystgen.emission.compensator import ConstantTable, Effects, EmittedStage, Field, Form, Glue, Writer
 from hystgen.emission.runtime import template
 from hystgen.emission.text import literal, operand
@@ -287,13 +287,8 @@ def instance(op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: 
 
 
 def _functions(
-    op: str,
-    t: Shape,
-    before: Sequence[NamedBlock] = (),
-    after: Sequence[NamedBlock] = (),
-    behind: Sequence[EmittedStage] = (),
-    clocks: Sequence[NamedBlock] = (),
-    rubbing: Sequence[NamedBlock | None] = (),
+    op: str, t: Shape, before: Sequence[NamedBlock] = (), after: Sequence[NamedBlock] = (),
+    behind: Sequence[EmittedStage] = (), clocks: Sequence[NamedBlock] = (), rubbing: Sequence[NamedBlock | None] = (),
 ) -> str:
     """The functions of one operator that name its blocks."""
     inverse = op == "inverse"

@@ -384,3 +384,6 @@ def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:
     ]
     arrays = (*(text for curve in curves for text in curve), writer.rows("bend_t", own, rows))
     return EmittedStage("bend", arrays, f"&hystgen_{own}", ", limited")
+
+
+FORM = FixedForm()

@@ -244,3 +244,6 @@ def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -
     words = "/* the straight pieces of the dead-zone sum */\n"
     lines = filled([*places, str(n)]).splitlines()
     return EmittedStage("dead_zone", (*arrays, writer.lines("dead_zone_t", own, lines, words=words)), f"&hystgen_{own}")
+
+
+FORM = FloatingForm()

@@ -11,7 +11,9 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from hystgen.basics.frozen import dataclass
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
@@ -84,11 +86,8 @@ def parsed(text: str) -> Function | None:
 
 
 def folded(
-    functions: Iterable[Function],
-    kernels: Iterable[Function],
-    wanted: Callable[[dict[str, Function]], Collection[str]],
-    apart: Sequence[str],
-    meaning: Callable[[str], str] = str,
+    functions: Iterable[Function], kernels: Iterable[Function],
+    wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
     """The functions of a model without code that does nothing. `wanted`: the names of those still called; the rest as
     in `_Folding`."""

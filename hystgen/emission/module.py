@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Names, Numbers, Writer
 from hystgen.emission.cost import Cost, Data
-from hystgen.emission.fixed import FixedForm
-from hystgen.emission.floating import FloatingForm
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
 from hystgen.emission.text import define, fit
@@ -22,9 +21,6 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
-
-FORMS: dict[str, Form] = {"float": FloatingForm(), "fixed": FixedForm()}
-"""By kind of arithmetic."""
 
 WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
 
@@ -36,7 +32,8 @@ def compensator(parameters: Parameters, cascade: StaticModel, options: Options) 
     family = dataclasses.replace(
         whole, chain=compiled is not None, loop=compiled is None and options.engine == "loop"
     )
-    form, name = FORMS[family.kind], parameters.name
+    form: Form = importlib.import_module(f"hystgen.emission.{family.form}").FORM
+    name = parameters.name
     names = Names(name, f"hystgen_{family.bits}" if options.layout == "shared-runtime" else name)
     writer = Writer(name, names.rt)
     glue: Glue | None = None
@@ -268,10 +265,9 @@ def files(module: Module) -> dict[str, str]:
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        found[file] = template(
-            f"selftest{ending}.j2", banner=top(file, about, more), name=name, NAME=one.names.NAME,
-            operators=operators, unread=slots.OP_UNREAD,
-        )
+        text = template(f"selftest{ending}.j2", operators=operators, unread=slots.OP_UNREAD)
+        text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # which no sample contains
+        found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}
 
 

@@ -12,7 +12,6 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
@@ -20,6 +19,7 @@ from typing import ClassVar
 import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
+from hystgen.basics.frozen import dataclass
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
@@ -74,11 +74,12 @@ class Family(ABC):
     """An arithmetic in C: its run-time files and its types; `chain`: in a model with effects; `loop`: in a model
     without effects in engine loop.
 
-    `kind`: the kind of arithmetic in file names; `ending`: of file names that have none in floating point;
-    `chain_types`: files with the types of effects; `helpers`: with functions that several effects call; `curves`: with
-    a memoryless part whose stages are not called one by one; `codes`: with codes; `moves_apart`: whether moving and
-    bending plays takes less stack in separate functions; `opening`: headers before all code of a file; in a single
-    header they stand between `opening_apart` and `closing`, so that they do not affect the code that includes it.
+    `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: of file names
+    that have none in floating point; `chain_types`: files with the types of effects; `helpers`: with functions that
+    several effects call; `curves`: with a memoryless part whose stages are not called one by one; `codes`: with codes;
+    `moves_apart`: whether moving and bending plays takes less stack in separate functions; `opening`: headers before
+    all code of a file; in a single header they stand between `opening_apart` and `closing`, so that they do not affect
+    the code that includes it.
     """
 
     arithmetic: Arithmetic
@@ -86,6 +87,7 @@ class Family(ABC):
     loop: bool = False
 
     kind: ClassVar[str]
+    form: ClassVar[str]
     ending: ClassVar[str]
     moves_apart: ClassVar[bool]
     chain_types: ClassVar[tuple[str, ...]]
@@ -189,7 +191,7 @@ def _apart(holds: bool, otherwise: str = "static ") -> str:
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
-    kind, ending, moves_apart = "float", "", False
+    kind, form, ending, moves_apart = "float", "floating", "", False
     chain_types, curves, codes = CHAIN_TYPES, (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
@@ -220,7 +222,7 @@ class FloatFamily(Family):
 class FixedFamily(Family):
     """Fixed point."""
 
-    kind, ending, moves_apart = "fixed", "_fixed", True
+    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", True
     chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
@@ -347,6 +349,7 @@ class Variant:
         return (f"{corners}forward.c", f"{corners}inverse{kind}.c", f"{corners}start.c")
 
 
+@functools.cache
 def data_folder(name: str) -> Path:
     """`templates`, `c_runtime` or `hystgen`: inside the installed package, or at the top of the checkout."""
     package = Path(__file__).resolve().parent.parent
@@ -363,6 +366,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
+        auto_reload=False,
     )
 
 
@@ -419,8 +423,6 @@ _MEMBER = re.compile(
     r"(?: : (?P<bits>\d+))?$"
 )
 _CONSTANT = re.compile(r"^static const (?:hystgen_)?(\w+) \w+((?:\[\d+\])*) = ", re.MULTILINE)
-
-
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
@@ -437,10 +439,11 @@ def split_pieces(source: str) -> list[Piece]:
         if inside:
             _, comment_ends, code = line.partition("*/")
             comment = not comment_ends
-        code = re.sub(r"/\*.*?\*/", "", code)
         if "/*" in code:
-            code, comment = code.partition("/*")[0], True
-        constant = not depth and bool(re.match(r"#define \w+ .", line))
+            code = _COMMENT.sub("", code)
+            code, opened, _ = code.partition("/*")
+            comment = comment or bool(opened)
+        constant = not depth and line.startswith("#define") and bool(re.match(r"#define \w+ .", line))
         if not depth and not constant and line.startswith("#"):
             lines = []
             continue
@@ -449,19 +452,17 @@ def split_pieces(source: str) -> list[Piece]:
             continue
         lines.append(line)
         depth += code.count("{") - code.count("}")
-        if constant or (not depth and re.search(r"[};]\s*$", code)):
+        if constant or (not depth and code.rstrip().endswith(("}", ";"))):
             pieces.append(_piece("\n".join(lines) + "\n"))
             lines = []
     return pieces
 
 
-def _defined_name(text: str) -> str:
-    code = _COMMENT.sub("", text)
-    typedef = re.search(r"}\s*(hystgen_\w+);\s*$", code)
-    if typedef and "typedef" in code:
+def _defined_name(code: str) -> str:
+    if "typedef" in code and (typedef := re.search(r"}\s*(hystgen_\w+);\s*$", code)):
         return typedef.group(1)
     declared = re.search(r"#define (HYSTGEN_\w+)|(hystgen_\w+)\s*[\[(]", code)
-    assert declared, f"no name in: {text}"
+    assert declared, f"no name in: {code}"
     return declared.group(1) or declared.group(2)
 
 
@@ -524,8 +525,13 @@ def forms(source: str, facts: Collection[str]) -> list[str]:
     ]
 
 
+@functools.cache
+def _pieces_of(file: str, facts: frozenset[str]) -> list[Piece]:
+    return [piece for text in forms(_read(file), facts) for piece in split_pieces(text)]
+
+
 def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
-    return [piece for file in files for text in forms(_read(file), facts) for piece in split_pieces(text)]
+    return [piece for file in files for piece in _pieces_of(file, frozenset(facts))]
 
 
 def kernel_pieces(family: Family) -> list[Piece]:
@@ -551,10 +557,7 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant,
-    operators: Iterable[str],
-    glue: str,
-    calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
     own: Sequence[Piece] = (),
 ) -> list[Piece]:
     """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
@@ -588,8 +591,9 @@ def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
 
 
 def _piece(text: str) -> Piece:
-    own = _defined_name(text)
-    return Piece(own, text, frozenset(_NAME.findall(_COMMENT.sub("", text))) - {own})
+    code = _COMMENT.sub("", text)
+    own = _defined_name(code)
+    return Piece(own, text, frozenset(_NAME.findall(code)) - {own})
 
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
@@ -681,11 +685,7 @@ def render_operators(
 
 
 def api(
-    operators: Iterable[str],
-    name: str,
-    prefix: str,
-    family: Family,
-    calls: Mapping[str, Iterable[str]],
+    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]],
     documented: Callable[[Sequence[Piece]], Iterable[Piece]],
 ) -> str:
     """Prototypes of a model's functions; `calls`: additional functions by operator; `documented`: puts the
@@ -715,11 +715,11 @@ def _named(
 ) -> str:
     """The text with the names of a model and of its run time; `carried`: run-time names that the model itself
     defines."""
-    for shared, here in family.signals.items():
-        cast = f"({shared})"
+    signals = family.signals
+    for shared, here in signals.items():
         if here == "hystgen_real_t" and not family.casts:
-            text = text.replace(cast, "")
-        text = re.sub(rf"\b{shared}\b", here, text)
+            text = text.replace(f"({shared})", "")
+    text = _NAME.sub(lambda found: signals.get(found[0], found[0]), text)
     for kind in SUMS:
         if (here := family.alike(kind)) != kind:
             text = text.replace(f"(hystgen_{kind})", "").replace(f"hystgen_{kind}", f"hystgen_{here}")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hystgen.basics.frozen import dataclass
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS
@@ -57,6 +57,11 @@ class Sample:
     argument: str
     answer: str
     status: int
+
+    @property
+    def row(self) -> str:
+        """The sample in C."""
+        return f"{{'{self.call}', {self.argument}, {self.answer}, {self.status}u}}"
 
 
 @dataclass(frozen=True)

@@ -129,10 +129,7 @@ class Stale:
 
 
 def advice(
-    models: Sequence[Stale],
-    unwritten: Sequence[Orphan],
-    folder: str,
-    given: Mapping[str, str | bool],
+    models: Sequence[Stale], unwritten: Sequence[Orphan], folder: str, given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
     """Commands that resolve the differences of all models and their orphans, each with its effect.

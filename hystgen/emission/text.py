@@ -168,7 +168,8 @@ _BEHIND = re.compile(r"(\s*\S.*?)\s+(/\* .* \*/)$")
 
 def _in_columns(lines: list[str]) -> Iterator[str]:
     """Align comments behind consecutive lines in one column."""
-    for commented, group in itertools.groupby(map(_BEHIND.fullmatch, lines), bool):
+    behind = (line.endswith("*/") and _BEHIND.fullmatch(line) for line in lines)  # most lines have no comment
+    for commented, group in itertools.groupby(behind, bool):
         found = list(group)
         here, lines = lines[: len(found)], lines[len(found) :]
         column = max(len(each[1]) for each in found if each) if commented else 0
@@ -196,7 +197,7 @@ def _fitted(lines: list[str]) -> Iterator[str]:
             end = next(i for i in range(at, len(lines)) if "*/" in lines[i])
             yield from _comment(lines[at : end + 1])
             at = end + 1
-        elif re.search(r"(=|enum) \{$", line):  # a table, or an enum with one name per line
+        elif line.endswith(("= {", "enum {")):  # a table, or an enum with one name per line
             end = next(i for i in range(at, len(lines)) if re.search(r"\};$|^\} \w+;$", lines[i]))
             for row in lines[at : end + 1]:
                 yield from _broken(row, row[: len(row) - len(row.lstrip())])
@@ -211,17 +212,20 @@ def _fitted(lines: list[str]) -> Iterator[str]:
 
 def _ends(lines: list[str], at: int) -> bool:
     """Whether a statement, or the head of a block, ends on this line."""
-    code = re.sub(r"\s*/\*.*$", "", lines[at])
+    code, commented, _ = lines[at].partition("/*")
+    code = code.rstrip() if commented else code
     following = lines[at + 1].strip() if at + 1 < len(lines) else "{"
     return not code.strip() or code.endswith((";", "{", "}")) or following in ("{", "")
 
 
 def _statement(lines: list[str], indent: str) -> Iterator[str]:
     """A statement on as few lines as it needs; a comment behind it that does not fit moves above it."""
-    last = re.match(r"^(.*?)(\s+/\*.*)?$", lines[-1])
-    assert last
-    code = re.sub(r"([(\[]) ", r"\1", " ".join([*(line.strip() for line in lines[:-1]), last[1].strip()]))
-    code, comment = re.sub(r" {2,}", " ", code), (last[2] or "") if code else ""
+    head, commented, _ = lines[-1].partition(" /*")
+    last = head.rstrip() if commented else head
+    code = " ".join([*(line.strip() for line in lines[:-1]), last.strip()]).replace("( ", "(").replace("[ ", "[")
+    comment = lines[-1][len(last) :] if code else ""
+    if "  " in code:
+        code = re.sub(r" {2,}", " ", code)
     if len(indent + code + comment) <= WIDTH:
         yield indent + code + comment
     elif comment and code.endswith("{"):

@@ -35,15 +35,16 @@ MAX_VALUES = 100_000
 """Limits on a file, so that anything other than a parameter file is refused at once. A file with 4096 plays has 8200
 values."""
 
-_NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
-_TRUE = re.compile(r"(?:true|True|TRUE)\Z")
-_FALSE = re.compile(r"(?:false|False|FALSE)\Z")
+_CONSTANTS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True), **dict.fromkeys(("false", "False", "FALSE"), False),
+    **{f"{sign}.{word}": float(f"{sign}inf") for sign in ("", "+", "-") for word in ("inf", "Inf", "INF")},
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+}
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _OCTAL = re.compile(r"0o[0-7]+\Z")
 _HEX = re.compile(r"0x[0-9a-fA-F]+\Z")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
-_INF = re.compile(r"[-+]?\.(?:inf|Inf|INF)\Z")
-_NAN = re.compile(r"\.(?:nan|NaN|NAN)\Z")
 _DIRECTIVE = re.compile(r"\ufeff?(?:[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n))*(?P<line>%[^\r\n]*)")
 _LONGEST_INT = 400
 """[digits] A decimal integer with this many is beyond double precision, whatever the digits are."""
@@ -102,10 +103,8 @@ class _OpenNode:
 
 def resolve(text: str) -> str | int | float | bool | None:
     """Value of a plain scalar under the YAML 1.2 core schema."""
-    if _NULL.match(text):
-        return None
-    if _TRUE.match(text) or _FALSE.match(text):
-        return bool(_TRUE.match(text))
+    if text in _CONSTANTS:
+        return _CONSTANTS[text]
     if _OCTAL.match(text):
         return int(text[2:], 8)
     if _HEX.match(text):
@@ -114,8 +113,6 @@ def resolve(text: str) -> str | int | float | bool | None:
         return int(text)
     if _FLOAT.match(text):
         return float(text)
-    if _INF.match(text) or _NAN.match(text):
-        return float(text.replace(".", ""))
     return text
 
 

@@ -77,11 +77,7 @@ BEND_BITS = 30
 
 
 def build(
-    chain: Chain,
-    arithmetic: str,
-    seconds: float,
-    how: Compensation,
-    lsb: tuple[float | None, float | None],
+    chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None],
     engine: str,
 ) -> Compiled:
     """The model in 'q31' or 'q15' at steps of `seconds`, if none of its effects is among the `tables.refusals`.
@@ -95,12 +91,7 @@ class _Builder:
     """The steps of `build`, each of which uses the results of those before it."""
 
     def __init__(
-        self,
-        chain: Chain,
-        arithmetic: str,
-        seconds: float,
-        how: Compensation,
-        lsb: tuple[float | None, float | None],
+        self, chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None],
         engine: str,
     ) -> None:
         self.arithmetic, self.seconds, self.how, self.engine = arithmetic, seconds, how, engine

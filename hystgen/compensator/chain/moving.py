@@ -243,14 +243,8 @@ def bumps(static: StaticModel, effects: Sequence[Effect], step: float, end: int,
 
 
 def build_fixed(
-    plays: FixedTables,
-    static: StaticModel,
-    effects: Sequence[Effect],
-    seconds: float,
-    farthest: int,
-    bump: Bumps,
-    step: float,
-    largest_step: float,
+    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float, farthest: int, bump: Bumps,
+    step: float, largest_step: float,
 ) -> at.FixedMovingTables:
     """The tables in fixed point, with inputs in steps of `step` and up to `farthest`. Raises OverflowError."""
     own = build(static, effects, seconds, largest_step, np.float64)

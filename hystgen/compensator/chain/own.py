@@ -402,12 +402,8 @@ def memory(t: OwnTables, dtype: DTypeLike) -> Reals:
 
 
 def arithmetic(
-    blocks: Sequence[OwnBlock],
-    effects: Sequence[type[Effect]],
-    made: Glue,
-    products: int,
-    tables: Callable[..., object],
-    formats: Callable[..., object] = lambda one, *_: one,
+    blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, products: int,
+    tables: Callable[..., object], formats: Callable[..., object] = lambda one, *_: one,
 ) -> Realized:
     """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications in one of
     theirs; `tables`, `formats`: as in `Realized`."""
