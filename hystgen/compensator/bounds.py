@@ -26,10 +26,10 @@ which side of it every drive lies, up to the rounding of G_R^-1 in double precis
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.basics.frozen import dataclass
 from hystgen.emission.compensator import ConstantTable, Effects, EmittedStage, Field, Form, Glue, Writer
 from hystgen.emission.runtime import template
 from hystgen.emission.text import literal, operand
