@@ -25,6 +25,42 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
+/* x > 0 as a mantissa of 31 bits. Returns the bits that it is shifted up by, before its upper word
+   is taken. */
+static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
+    unsigned int raised = 0;
+    unsigned int bits;
+    for (bits = HYSTGEN_WORD; bits > 0; bits /= 2u) {
+        if (x >> (2u * HYSTGEN_WORD - 1u - bits) == 0) {
+            x <<= bits;
+            raised += bits;
+        }
+    }
+    *mantissa = (uint32_t)(x >> HYSTGEN_WORD);
+    return raised;
+}
+
+/* x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no less than
+   2^60 beyond that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17 y, a 17th off, and
+   each step squares that share. */
+HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y) {
+    uint32_t number;
+    uint32_t divisor;
+    if (x == 0) {
+        return 0;
+    }
+    const unsigned int raised = hystgen_mantissa((uint64_t)x, &number);
+    const unsigned int lifted = hystgen_mantissa((uint64_t)y, &divisor);
+    uint32_t rate = 3031741620u - (uint32_t)(hystgen_wide(divisor, 2021161080u) >> 31);
+    unsigned int i;
+    for (i = 0; i < 3u; ++i) {
+        const uint32_t off = 2147483648u - (uint32_t)(hystgen_wide(divisor, rate) >> 31);
+        rate = (uint32_t)(hystgen_wide(rate, off) >> 30);
+    }
+    const unsigned int shift = 60u + raised > lifted ? 60u + raised - lifted : 0u;
+    return shift > 62u ? 0 : (int64_t)(((hystgen_wide(number, rate) >> shift) + 1u) >> 1);
+}
+
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {

@@ -243,6 +243,7 @@ def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
 
 _PLAYS = "play 0 is the input of the plays"
 _KEPT = "; after them the rounding remainder of each"
+_BENT = "contribution of each play; before them the slope of a search in fixed point"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
@@ -281,7 +282,7 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * moving,
+        *[Field("signal_t", "bent", _BENT, plays + 1)] * moving,
     ]
 
 

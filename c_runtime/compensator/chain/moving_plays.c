@@ -9,16 +9,16 @@
 #include "effects/catalogue.h"
 
 #ifdef HYSTGEN_HAS_MOVES_APART
-/* Play i after the input of the plays has moved to w. Not inlined, to need less stack. */
+/* Play i after the input of the plays has moved from x to w. Not inlined, to need less stack. */
 HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t w) {
-    return hystgen_moved(i, play, w);
+                                             hystgen_play_t x, hystgen_play_t w) {
+    return hystgen_moved(i, play, x, w);
 }
 #else
-/* Play i after the input of the plays has moved to w. */
+/* Play i after the input of the plays has moved from x to w. */
 static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t w) {
-    return hystgen_moved(i, play, w);
+                                             hystgen_play_t x, hystgen_play_t w) {
+    return hystgen_moved(i, play, x, w);
 }
 #endif
 
@@ -29,9 +29,9 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 }
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
-/* Play i moves while the input of the plays moves to w. */
-static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
-    play[i] = hystgen_reached(i, play, w);
+/* Play i moves while the input of the plays moves from x to w. */
+static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
+    play[i] = hystgen_reached(i, play, x, w);
 }
 
 /* Play i rests at z. */
@@ -46,6 +46,15 @@ static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *p
                                          const hystgen_sum_t *bent, hystgen_play_t z) {
     return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
 }
+
+/* Play i has moved from z. Updates its contribution. Returns it. */
+static hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play, hystgen_sum_t *bent,
+                                    hystgen_play_t z) {
+    if (play[i] < z || play[i] > z) {
+        bent[i] = hystgen_bent(i, play[i]);
+    }
+    return bent[i];
+}
 #else
 /* Contribution of play i at z: z itself. */
 static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
@@ -55,20 +64,13 @@ static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_pl
     (void)bent;
     return z;
 }
-#endif
 
-#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
-/* Contribution of play i after the input of the plays has moved to w. Not inlined, to need less
-   stack. */
-HYSTGEN_APART hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
-                                          const hystgen_sum_t *bent, hystgen_play_t w) {
-    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
-}
-#else
-/* Contribution of play i after the input of the plays has moved to w. */
-static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
-                                          const hystgen_sum_t *bent, hystgen_play_t w) {
-    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
+/* Contribution of play i: where it is. */
+static inline hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play,
+                                           hystgen_sum_t *bent, hystgen_play_t z) {
+    (void)bent;
+    (void)z;
+    return play[i];
 }
 #endif
 
@@ -76,25 +78,25 @@ static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    const hystgen_play_t x = play[0];
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_play_t before = play[i];
-        hystgen_move(i, play, w);
-        if (play[i] < before || play[i] > before) {
-            bent[i] = hystgen_bent(i, play[i]);
-        }
-        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+        hystgen_move(i, play, x, w);
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_rebent(i, play, bent, before);
     }
     play[0] = w;
     return sum;
 }
 
-/* The plays come to rest with their input at w. Returns their sum. */
+/* The plays come to rest with their input at w. Returns their sum. The entry of `bent` before
+   theirs is the slope that a search in fixed point begins with. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
                                                hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+    bent[0] = hystgen_model_tables.weight[0];
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
@@ -120,14 +122,15 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
+#ifdef HYSTGEN_FIXED
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
-                                                         hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     if (self->moving) {
         for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_sum_t value = hystgen_value(i, self->play, self->bent, w);
+            const hystgen_sum_t value = hystgen_contributed(
+                i, self->play, self->bent, hystgen_reached(i, self->play, self->play[0], w));
             sum = sum + hystgen_model_tables.weight[i] * value;
         }
         return sum;
@@ -140,5 +143,28 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t
     }
     return sum;
 }
+#else
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. `slope`:
+   its change per change of w, which only guides a search. */
+static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w,
+                                          hystgen_real_t *slope) {
+    hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
+    hystgen_real_t rising = hystgen_model_tables.weight[0];
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_real_t steep;
+        hystgen_real_t z = hystgen_tried(i, self->play, w, &steep);
+        if (!self->moving) {
+            z = hystgen_resting(i, self->play, w);
+        }
+        const hystgen_real_t value = hystgen_contributed(i, self->play, self->bent, z);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+        rising = rising + hystgen_bent_steep(i, z, value, steep);
+    }
+    *slope = rising;
+    return sum;
+}
+#endif
 
 #endif

@@ -98,8 +98,10 @@ typedef struct {
 typedef struct {
     hystgen_real_t low;
     hystgen_real_t high;
-    hystgen_real_t middle;
+    hystgen_real_t input; /* tried last, */
     hystgen_real_t sum;
+    hystgen_real_t left;  /* what the sum lacks there, */
+    hystgen_real_t slope; /* and its change per change of the input */
 } hystgen_search_t;
 
 #endif

@@ -93,6 +93,18 @@ typedef struct {
     bool begun; /* the friction plays have values */
 } hystgen_friction_t;
 
+/* A search between two inputs of the plays, which are not tried again, for the one at which their
+   sum is `sum`. */
+typedef struct {
+    int64_t low;
+    int64_t high;
+    int64_t short_of; /* what the sum lacks at `low`, or 0 if `low` is below all inputs, */
+    int64_t over;     /* and what it has too much at `high`, or -1 */
+    int64_t sum;
+    int64_t found;        /* sum at */
+    hystgen_play_t input; /* the one tried last */
+} hystgen_search_t;
+
 typedef struct {
     int64_t whole;  /* drift, in units of signals, */
     int64_t part;   /* and the fraction below, in units of the table */
