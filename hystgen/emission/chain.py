@@ -283,6 +283,7 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
         *[Field("signal_t", "bent", _BENT, plays + 1)] * moving,
+        *[Field("search_t", "search", "for the input of the plays")] * (moving and inverse),
     ]
 
 

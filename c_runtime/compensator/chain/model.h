@@ -135,6 +135,7 @@ typedef struct {
 #ifndef HYSTGEN_HAS_CORNERS
     hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
     hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+    hystgen_search_t search;
 #else
     bool sought;
 #ifdef HYSTGEN_FIXED

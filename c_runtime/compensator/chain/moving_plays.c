@@ -30,9 +30,16 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
 /* Play i moves while the input of the plays moves from x to w. */
+#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
+HYSTGEN_APART void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
+                                hystgen_play_t w) {
+    play[i] = hystgen_reached(i, play, x, w);
+}
+#else
 static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
     play[i] = hystgen_reached(i, play, x, w);
 }
+#endif
 
 /* Play i rests at z. */
 static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
@@ -78,12 +85,17 @@ static inline hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t 
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+    const hystgen_play_t *from = play; /* read for each play: saved across calls, it takes stack */
+#else
     const hystgen_play_t x = play[0];
+    const hystgen_play_t *from = &x;
+#endif
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_play_t before = play[i];
-        hystgen_move(i, play, x, w);
+        hystgen_move(i, play, *from, w);
         sum = sum + hystgen_model_tables.weight[i] * hystgen_rebent(i, play, bent, before);
     }
     play[0] = w;
@@ -143,13 +155,42 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, h
     }
     return sum;
 }
+#elif defined(HYSTGEN_HAS_BUMP)
+/* Play i with its input at that of the search. Sets the play's slope. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_tried(hystgen_inverse_t *self, unsigned int i) {
+    const hystgen_real_t w = self->search.input;
+    const hystgen_real_t z = hystgen_tried(i, self->play, w, &self->search.steep);
+    return self->moving ? z : hystgen_resting(i, self->play, w);
+}
+
+/* Adds play i to the sum and the slope of a search. In memory, which needs less stack than numbers
+   that are saved across a call. */
+HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) {
+    hystgen_search_t *search = &self->search;
+    const hystgen_real_t z = hystgen_inverse_tried(self, i);
+    const hystgen_real_t value = hystgen_contributed(i, self->play, self->bent, z);
+    search->left = search->left + hystgen_model_tables.weight[i] * value;
+    search->slope = search->slope + hystgen_bent_steep(i, z, value, search->steep);
+}
+
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
+   slope of the search to its change per change of w. */
+static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
+    unsigned int i;
+    self->search.left = hystgen_model_tables.weight[0] * w;
+    self->search.slope = hystgen_model_tables.weight[0];
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_inverse_add(self, i);
+    }
+    return self->search.left;
+}
 #else
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. `slope`:
-   its change per change of w, which only guides a search. */
-static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w,
-                                          hystgen_real_t *slope) {
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
+   slope of the search to its change per change of w. */
+static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
     hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
-    hystgen_real_t rising = hystgen_model_tables.weight[0];
+    hystgen_real_t slope = hystgen_model_tables.weight[0];
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -160,9 +201,9 @@ static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen
         }
         const hystgen_real_t value = hystgen_contributed(i, self->play, self->bent, z);
         sum = sum + hystgen_model_tables.weight[i] * value;
-        rising = rising + hystgen_bent_steep(i, z, value, steep);
+        slope = slope + hystgen_bent_steep(i, z, value, steep);
     }
-    *slope = rising;
+    self->search.slope = slope;
     return sum;
 }
 #endif

@@ -15,77 +15,99 @@ static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
     return x < 0 ? -x : x;
 }
 
-/* Tries an input. The interval ends there from now on. */
-HYSTGEN_APART void hystgen_inverse_try(const hystgen_inverse_t *self, hystgen_search_t *search) {
-    const hystgen_sum_t found = hystgen_inverse_sum(self, search->input);
+/* Begins a search for the sum h at the present input. */
+HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_t h) {
+    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
+    self->search.top = HYSTGEN_LARGEST_INPUT;
+    self->search.short_of = 0;
+    self->search.over = -1;
+    self->search.sum = hystgen_asked(h);
+    self->search.input = self->play[0];
+    self->search.before = self->play[0];
+}
+
+/* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
+   search is over. */
+HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t found) {
     search->found = found;
     if (found < search->sum) {
         search->low = search->input;
         search->short_of = search->sum - found;
     } else {
-        search->high = search->input;
+        search->top = search->input - 1;
         search->over = found - search->sum;
+    }
+    return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
+}
+
+/* Updates the slope to that of the secant through the last two inputs, if they are far apart. */
+HYSTGEN_APART void hystgen_inverse_turn(hystgen_inverse_t *self) {
+    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)self->search.input - self->search.before);
+    if (way >= HYSTGEN_SECANT) {
+        const hystgen_sum_t gained = hystgen_size(self->search.found - self->search.last);
+        const hystgen_sum_t slope = hystgen_quotient(gained, way);
+        self->bent[0] = slope > 1 ? slope : 1;
     }
 }
 
-/* The input that `slope` leads to from the last one, at least one on and none beyond all. */
-static hystgen_sum_t hystgen_inverse_next_input(const hystgen_search_t *search,
-                                                hystgen_sum_t slope) {
+/* The way from the input tried last to the solution by the slope. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_left(const hystgen_inverse_t *self) {
+    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum), self->bent[0]);
+}
+
+/* Goes on to an input inside the interval, or else to its middle. */
+HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t next) {
+    search->before = search->input;
+    search->last = search->found;
+    if (next > search->low && next <= search->top) {
+        search->input = (hystgen_play_t)next;
+    } else {
+        const uint32_t size = (uint32_t)search->top - (uint32_t)search->low + 1u;
+        search->input = (hystgen_play_t)(search->low + (hystgen_sum_t)(size / 2u));
+    }
+}
+
+/* The input a way on from the one tried last, at least one and not beyond all. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search,
+                                                    hystgen_sum_t way) {
     const bool rising = search->found < search->sum;
     const hystgen_sum_t input = search->input;
     const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
-    const hystgen_sum_t step = hystgen_quotient(rising ? search->short_of : search->over, slope);
-    const hystgen_sum_t some = step > 1 ? step : 1;
-    const hystgen_sum_t way = some > room ? room : some;
-    return rising ? input + way : input - way;
+    const hystgen_sum_t some = way > 1 ? way : 1;
+    const hystgen_sum_t inside = some > room ? room : some;
+    return rising ? input + inside : input - inside;
 }
 
-/* Tries the next input; `secant`: by the slope. Updates the slope. */
-HYSTGEN_APART void hystgen_inverse_proceed(hystgen_inverse_t *self, hystgen_search_t *search,
-                                           bool secant) {
-    const hystgen_play_t before = search->input;
-    const hystgen_sum_t last = search->found;
-    const hystgen_sum_t next = secant ? hystgen_inverse_next_input(search, self->bent[0]) : before;
-    if (next > search->low && next < search->high) {
-        search->input = (hystgen_play_t)next;
-    } else {
-        const uint32_t size = (uint32_t)(search->high - search->low);
-        search->input = (hystgen_play_t)(search->low + (hystgen_sum_t)(size / 2u));
+/* Goes on to the next input: by the slope of a secant, or, after too many tries, to the middle of
+   the interval, which the input tried last is an end of. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool secant) {
+    hystgen_sum_t next = self->search.input;
+    if (secant) {
+        hystgen_inverse_turn(self);
+        next = hystgen_inverse_further(&self->search, hystgen_inverse_left(self));
     }
-    hystgen_inverse_try(self, search);
-    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - before);
-    if (secant && way >= HYSTGEN_SECANT) {
-        const hystgen_sum_t slope = hystgen_quotient(hystgen_size(search->found - last), way);
-        self->bent[0] = slope > 1 ? slope : 1;
-    }
+    hystgen_inverse_go(&self->search, next);
 }
 
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
-    hystgen_search_t search;
     unsigned int tries = 0;
-    search.low = -(hystgen_sum_t)HYSTGEN_LARGEST_INPUT - 1;
-    search.high = (hystgen_sum_t)HYSTGEN_LARGEST_INPUT + 1;
-    search.short_of = 0;
-    search.over = -1;
-    search.sum = hystgen_asked(h);
-    search.input = self->play[0];
-    hystgen_inverse_try(self, &search);
-    while (hystgen_size(search.found - search.sum) > HYSTGEN_NEAR) {
-        if (search.high - search.low == 1) {
-            return (hystgen_reach_t)(search.short_of > search.over ? search.high : search.low);
-        }
-        hystgen_inverse_proceed(self, &search, tries < HYSTGEN_SECANTS);
+    hystgen_inverse_seek(self, h);
+    while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
+        hystgen_inverse_advance(self, tries < HYSTGEN_SECANTS);
         ++tries;
     }
-    return search.input;
+    if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
+        return self->search.input;
+    }
+    return (hystgen_reach_t)self->search.low + (self->search.short_of > self->search.over ? 1 : 0);
 }
 #else
-/* Tries an input. The interval ends there from now on. A search in memory needs half as much stack
-   as registers saved across a call. */
-HYSTGEN_APART bool hystgen_inverse_found(const hystgen_inverse_t *self, hystgen_search_t *search) {
-    search->left = search->sum - hystgen_inverse_sum(self, search->input, &search->slope);
+/* Tries an input. The interval ends there from now on. */
+HYSTGEN_APART bool hystgen_inverse_found(hystgen_inverse_t *self) {
+    hystgen_search_t *search = &self->search;
+    search->left = search->sum - hystgen_inverse_sum(self, search->input);
     if (search->left <= HYSTGEN_CLOSE && search->left >= -HYSTGEN_CLOSE) {
         return true;
     }
@@ -97,33 +119,36 @@ HYSTGEN_APART bool hystgen_inverse_found(const hystgen_inverse_t *self, hystgen_
     return false;
 }
 
-/* The next input by Newton's method. */
-static hystgen_real_t hystgen_inverse_newton(const hystgen_search_t *search) {
-    hystgen_real_t rate = HYSTGEN_RATE;
-    unsigned int i;
-    for (i = 0; i < HYSTGEN_TURNS; ++i) {
-        rate = rate + rate - search->slope * rate * rate;
+/* Goes on to the next input; `newton`: by the slope. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool newton) {
+    hystgen_search_t *search = &self->search;
+    if (newton) {
+        hystgen_real_t rate = HYSTGEN_RATE;
+        unsigned int i;
+        for (i = 0; i < HYSTGEN_TURNS; ++i) {
+            rate = rate + rate - search->slope * rate * rate;
+        }
+        search->input = search->input + search->left * rate;
     }
-    return search->input + search->left * rate;
+    if (!(search->input > search->low && search->input < search->high)) {
+        search->input = search->low + (search->high - search->low) / 2;
+    }
 }
 
 /* Input of the plays at which their sum is h. The last step is by the reciprocal of a slope that is
    right in the middle, and takes the sum no farther away for any other. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self,
-                                                   hystgen_real_t h) {
-    hystgen_search_t search = {HYSTGEN_LEAST_INPUT, HYSTGEN_LARGEST_INPUT, self->play[0], h, 0, 0};
+HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
     unsigned int i;
+    self->search.low = HYSTGEN_LEAST_INPUT;
+    self->search.high = HYSTGEN_LARGEST_INPUT;
+    self->search.input = self->play[0];
+    self->search.sum = h;
     for (i = 0; i < HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES; ++i) {
-        if (hystgen_inverse_found(self, &search)) {
-            return search.input + search.left * HYSTGEN_RATE;
+        if (hystgen_inverse_found(self)) {
+            return self->search.input + self->search.left * HYSTGEN_RATE;
         }
-        if (i < HYSTGEN_NEWTON_TRIES) {
-            search.input = hystgen_inverse_newton(&search);
-        }
-        if (!(search.input > search.low && search.input < search.high)) {
-            search.input = search.low + (search.high - search.low) / 2;
-        }
+        hystgen_inverse_advance(self, i < HYSTGEN_NEWTON_TRIES);
     }
-    return search.high;
+    return self->search.high;
 }
 #endif

@@ -46,30 +46,32 @@ def search(sum_at: Callable[..., Any], _: object) -> Callable[..., Any]:
         short = 0  # of the sum at `low`; ends beyond the farthest input are not tried, but taken if they remain
         over = -1  # and at `high`
         w = s.plays.play[0]
-        total = sum_at(t, s, w)
+        before = w
+        last = h
         tries = 0
-        while size(total - h) > t.moving.near:
+        while True:
+            total = sum_at(t, s, w)
             if total < h:
                 low = w
                 short = h - total
             else:
                 high = w
                 over = total - h
+            if size(total - h) <= t.moving.near:
+                return w
             if high - low == 1:
                 return high if short > over else low
+            way = size(w - before)
+            if tries < SECANTS and way >= SECANT:
+                slope = quotient(size(total - last), way)
+                s.bent[0] = slope if slope > 0 else slope + 1
             before = w
             last = total
             if tries < SECANTS:
                 w = input_after(t, w, h - total, s.bent[0])
             if w <= low or w >= high:  # nor is the end that was just tried
                 w = low + (high - low) // 2
-            total = sum_at(t, s, w)
-            way = size(w - before)
-            if tries < SECANTS and way >= SECANT:
-                slope = quotient(size(total - last), way)
-                s.bent[0] = slope if slope > 0 else slope + 1
             tries += 1
-        return w
 
     return searched
 
