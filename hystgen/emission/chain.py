@@ -216,7 +216,7 @@ def effects(
 
 def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage]) -> Glue:
     """The glue of a model with effects."""
-    from hystgen.effects.plays import DASHPOT
+    from hystgen.effects.plays import DASHPOT, STRAIGHT
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     shape = Shape.of(t, form)
@@ -230,7 +230,8 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == DASHPOT)
-    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched) for op in operators}
+    bent = t.moving.bends != STRAIGHT
+    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched, bent) for op in operators}
     return Glue(fields, "\n".join(functions), calls)
 
 
@@ -238,16 +239,17 @@ def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
     """The glue of a model without effects in engine loop, which is a chain without blocks."""
     shape = Shape(form)
     functions = [_functions(op, shape) for op in operators]
-    return Glue({op: instance(op, shape, (), plays, 0, False) for op in operators}, "\n".join(functions), {})
+    return Glue({op: instance(op, shape, (), plays, 0) for op in operators}, "\n".join(functions), {})
 
 
 _PLAYS = "play 0 is the input of the plays"
 _KEPT = "; after them the rounding remainder of each"
-_BENT = "contribution of each play; before them the slope of a search in fixed point"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
-def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(
+    op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, sought: bool = False, bent: bool = False
+) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", t.taps
     waiting = 0 if inverse else t.waiting
@@ -282,8 +284,8 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", _BENT, plays + 1)] * moving,
-        *[Field("search_t", "search", "for the input of the plays")] * (moving and inverse),
+        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * bent,
+        *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
     ]
 
 

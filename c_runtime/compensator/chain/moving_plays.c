@@ -58,7 +58,7 @@ static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *p
 static hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play, hystgen_sum_t *bent,
                                     hystgen_play_t z) {
     if (play[i] < z || play[i] > z) {
-        bent[i] = hystgen_bent(i, play[i]);
+        return hystgen_bent_anew(i, play[i], bent);
     }
     return bent[i];
 }
@@ -102,47 +102,66 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_s
     return sum;
 }
 
-/* The plays come to rest with their input at w. Returns their sum. The entry of `bent` before
-   theirs is the slope that a search in fixed point begins with. */
+/* The plays come to rest with their input at w. Returns their sum. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
                                                hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
-    bent[0] = hystgen_model_tables.weight[0];
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
-        bent[i] = hystgen_bent(i, play[i]);
-        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_bent_anew(i, play[i], bent);
     }
     play[0] = w;
     return sum;
 }
 
+/* Contributions of the plays, if they are bent. */
+static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+    return self->bent;
+#else
+    (void)self;
+    return NULL;
+#endif
+}
+
+/* The plays come to rest with their input at w, and a search in fixed point begins anew. Updates
+   their sum. */
+static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
+#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
+    self->search.slope = hystgen_model_tables.weight[0];
+#endif
+    self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
+}
+
 /* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
-        self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
-        hystgen_relax(self->play, self->bent);
+        hystgen_sum_t *bent = hystgen_operator_bent(self);
+        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+        hystgen_relax(self->play, bent);
     } else {
-        self->level = hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+        hystgen_operator_settle_plays(self, w);
     }
 }
 
 /* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
-    return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
+    hystgen_operator_settle_plays(self, self->play[0]);
+    return self->level;
 }
 
 #ifdef HYSTGEN_FIXED
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     if (self->moving) {
         for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_sum_t value = hystgen_contributed(
-                i, self->play, self->bent, hystgen_reached(i, self->play, self->play[0], w));
+            const hystgen_sum_t value =
+                hystgen_contributed(i, self->play, hystgen_operator_bent(self),
+                                    hystgen_reached(i, self->play, self->play[0], w));
             sum = sum + hystgen_model_tables.weight[i] * value;
         }
         return sum;
@@ -150,7 +169,8 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, h
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+        const hystgen_sum_t value =
+            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
         sum = sum + hystgen_model_tables.weight[i] * value;
     }
     return sum;
@@ -168,7 +188,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_tried(hystgen_inverse_t *self, unsi
 HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) {
     hystgen_search_t *search = &self->search;
     const hystgen_real_t z = hystgen_inverse_tried(self, i);
-    const hystgen_real_t value = hystgen_contributed(i, self->play, self->bent, z);
+    const hystgen_real_t value = hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
     search->left = search->left + hystgen_model_tables.weight[i] * value;
     search->slope = search->slope + hystgen_bent_steep(i, z, value, search->steep);
 }
@@ -199,7 +219,8 @@ static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_
         if (!self->moving) {
             z = hystgen_resting(i, self->play, w);
         }
-        const hystgen_real_t value = hystgen_contributed(i, self->play, self->bent, z);
+        const hystgen_real_t value =
+            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
         sum = sum + hystgen_model_tables.weight[i] * value;
         slope = slope + hystgen_bent_steep(i, z, value, steep);
     }

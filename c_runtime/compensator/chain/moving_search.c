@@ -46,13 +46,14 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_inverse_t *self) {
     if (way >= HYSTGEN_SECANT) {
         const hystgen_sum_t gained = hystgen_size(self->search.found - self->search.last);
         const hystgen_sum_t slope = hystgen_quotient(gained, way);
-        self->bent[0] = slope > 1 ? slope : 1;
+        self->search.slope = slope > 1 ? slope : 1;
     }
 }
 
 /* The way from the input tried last to the solution by the slope. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_left(const hystgen_inverse_t *self) {
-    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum), self->bent[0]);
+    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum),
+                            self->search.slope);
 }
 
 /* Goes on to an input inside the interval, or else to its middle. */

@@ -102,6 +102,7 @@ typedef struct {
     int64_t over;     /* and what it has too much above `top`, or -1 */
     int64_t found;    /* sum at the input tried last, */
     int64_t last;     /* and at the one before */
+    int64_t slope;    /* change of the sum per change of the input; kept from search to search */
     int32_t input;    /* the one tried last, */
     int32_t before;   /* and the one before */
     int32_t low;

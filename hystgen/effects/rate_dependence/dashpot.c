@@ -67,9 +67,10 @@ HYSTGEN_APART_IN_FLOAT void hystgen_move(unsigned int i, hystgen_play_t *play, h
     play[i] = z;
 }
 
-/* Play i rests at z. */
+/* Play i rests at z. A store through volatile, or gcc would call memset for all plays. */
 static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
-    play[HYSTGEN_N_PLAYS + i] = 0;
+    volatile hystgen_play_t *lost = &play[HYSTGEN_N_PLAYS + i];
+    *lost = 0;
     play[i] = z;
 }
 
