@@ -371,7 +371,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("a dashpot yields to one side alone", "effects/rate_dependence/dashpot.c", "x < 0 ? lost - gained",
      "x < 0 ? lost + gained", "dashpot", "float32"),
     ("a settled play keeps its remainder", "effects/rate_dependence/dashpot.c", "    *lost = 0;\n",
-     "    (void)lost;\n", "dashpot", "float32"),
+     "    *lost = *lost;\n", "dashpot", "float32"),
     ("thresholds grow with rising drives alone", "effects/rate_dependence/moved.c", "(hystgen_sum_t)x - w;",
      "(hystgen_sum_t)0;", "dilated", "float32"),
     ("plays never move", "compensator/chain/moving_plays.c",

@@ -25,6 +25,11 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
+/* The lower 31 bits, which are all that there are of what this is called with. */
+static inline uint32_t hystgen_low_31(uint64_t x) {
+    return (uint32_t)x & 0x7fffffffu;
+}
+
 /* x > 0 as a mantissa of 31 bits. Returns the bits that it is shifted up by, before its upper word
    is taken. */
 static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
@@ -32,11 +37,11 @@ static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
     unsigned int bits;
     for (bits = HYSTGEN_WORD; bits > 0; bits /= 2u) {
         if (x >> (2u * HYSTGEN_WORD - 1u - bits) == 0) {
-            x <<= bits;
-            raised += bits;
+            x = (x & (UINT64_MAX >> bits)) << bits;
+            raised |= bits;
         }
     }
-    *mantissa = (uint32_t)(x >> HYSTGEN_WORD);
+    *mantissa = hystgen_low_31(x >> HYSTGEN_WORD);
     return raised;
 }
 
@@ -49,16 +54,19 @@ HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y) {
     if (x == 0) {
         return 0;
     }
-    const unsigned int raised = hystgen_mantissa((uint64_t)x, &number);
-    const unsigned int lifted = hystgen_mantissa((uint64_t)y, &divisor);
+    const int raised = (int)hystgen_mantissa((uint64_t)x, &number);
+    const int lifted = (int)hystgen_mantissa((uint64_t)y, &divisor);
     uint32_t rate = 3031741620u - (uint32_t)(hystgen_wide(divisor, 2021161080u) >> 31);
     unsigned int i;
     for (i = 0; i < 3u; ++i) {
-        const uint32_t off = 2147483648u - (uint32_t)(hystgen_wide(divisor, rate) >> 31);
+        const uint32_t off = 0x80000000u - hystgen_low_31(hystgen_wide(divisor, rate) >> 31);
         rate = (uint32_t)(hystgen_wide(rate, off) >> 30);
     }
-    const unsigned int shift = 60u + raised > lifted ? 60u + raised - lifted : 0u;
-    return shift > 62u ? 0 : (int64_t)(((hystgen_wide(number, rate) >> shift) + 1u) >> 1);
+    const int shift = 60 + raised - lifted;
+    if (shift > 62) {
+        return 0;
+    }
+    return (int64_t)(((hystgen_wide(number, rate) >> (shift > 0 ? shift : 0)) + 1u) >> 1);
 }
 
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal

@@ -63,8 +63,8 @@ HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t ne
     if (next > search->low && next <= search->top) {
         search->input = (hystgen_play_t)next;
     } else {
-        const uint32_t size = (uint32_t)search->top - (uint32_t)search->low + 1u;
-        search->input = (hystgen_play_t)(search->low + (hystgen_sum_t)(size / 2u));
+        const hystgen_sum_t size = (hystgen_sum_t)search->top - search->low + 1;
+        search->input = (hystgen_play_t)(search->low + size / 2);
     }
 }
 
@@ -97,7 +97,9 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     hystgen_inverse_seek(self, h);
     while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
         hystgen_inverse_advance(self, tries < HYSTGEN_SECANTS);
-        ++tries;
+        if (tries < HYSTGEN_SECANTS) {
+            ++tries;
+        }
     }
     if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
         return self->search.input;
