@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.basics.jit import Answer, jit
+from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
@@ -15,13 +14,13 @@ from hystgen.plays.fixed import loop_solve, nearest, quotient
 
 
 @jit(inline=True)
-def size(x: Any) -> Any:
+def size(x: int) -> int:
     """Distance of x from 0."""
     return -x if x < 0 else x
 
 
 @jit
-def input_after(t: ChainTables, w: Any, left: Any, slope: Any) -> Any:
+def input_after(t: FixedChainTables, w: int, left: int, slope: int) -> int:
     """The input that `slope` leads to from w, at least one on and none beyond all."""
     farthest = t.moving.farthest
     room = farthest - w if left > 0 else farthest + w
@@ -33,11 +32,11 @@ def input_after(t: ChainTables, w: Any, left: Any, slope: Any) -> Any:
     return w + step if left > 0 else w - step
 
 
-def search(sum_at: Callable[..., Any], _: object) -> Callable[..., Any]:
+def search(sum_at: Callable[..., int], _: object) -> Answer:
     """The search of `moving_search.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
-    def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
+    def searched(t: FixedChainTables, s: ChainState, h: int) -> int:
         """Input of the plays at which their sum is h: by secants from the present input, the first one as steep as the
         last of the sample before, within the interval of inputs that are left, then by halving it. The nearer of two
         neighbours, or the input beyond the farthest if even that is not enough."""
@@ -77,13 +76,13 @@ def search(sum_at: Callable[..., Any], _: object) -> Callable[..., Any]:
 
 
 @jit
-def level(t: ChainTables, total: Any) -> Any:
+def level(t: FixedChainTables, total: int) -> int:
     """A sum of the plays, which has bits below a signal's, as a signal."""
     return nearest(total, t.number.level_drop[0])
 
 
 @jit
-def asked(t: ChainTables, h: Any) -> Any:
+def asked(t: FixedChainTables, h: int) -> int:
     """The sum of the plays that a signal asks for, limited to their range."""
     inside = h
     if inside > t.number.largest_level[0]:

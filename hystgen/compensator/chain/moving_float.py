@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.basics.jit import Answer, Scalar, jit
+from hystgen.compensator.chain.layout import FloatChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
@@ -14,17 +13,17 @@ from hystgen.effects.plays import CLOSE, HALF, LARGEST_INPUT, LEAST_INPUT, NEWTO
 from hystgen.plays.loop import loop_solve
 
 
-def search(_: object, sum_at: Callable[..., Any]) -> Callable[..., Any]:
+def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar]]) -> Answer:
     """The search of `moving_search.c`, from the function that gives the sum of the plays at an input, and its slope."""
 
     @jit
-    def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
+    def searched(t: FloatChainTables, s: ChainState, h: Scalar) -> Scalar:
         """Input of the plays at which their sum is h: by Newton's method from the present input, within the interval of
         inputs that are left, then by halving it."""
         number = t.moving.number
-        low = number[LEAST_INPUT]
-        high = number[LARGEST_INPUT]
-        w = s.plays.play[0]
+        low: Scalar = number[LEAST_INPUT]
+        high: Scalar = number[LARGEST_INPUT]
+        w: Scalar = s.plays.play[0]
         for k in range(NEWTON_TRIES + t.moving.halves):
             total, slope = sum_at(t, s, w)
             left = h - total
@@ -44,16 +43,16 @@ def search(_: object, sum_at: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @jit
-def inverse(t: ChainTables, slope: Any) -> Any:
+def inverse(t: FloatChainTables, slope: Scalar) -> Scalar:
     """1/slope, without division."""
-    rate = t.moving.number[RATE]
+    rate: Scalar = t.moving.number[RATE]
     for _ in range(t.moving.turns):
         rate = rate + rate - slope * rate * rate
     return rate
 
 
 @jit(inline=True)
-def same(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+def same(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
     """A sum of the plays as a signal, and a signal as a sum."""
     return x
 

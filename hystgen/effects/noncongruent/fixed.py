@@ -11,7 +11,7 @@ from hystgen.plays.fixed import nearest
 
 
 @jit
-def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG001  as in floating point
+def bent(t: FixedMovingTables, plays: Any, i: int, z: int) -> int:  # noqa: ARG001  as in floating point
     """Contribution of play i at z."""
     if t.bends == STRAIGHT:
         return z
