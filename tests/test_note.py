@@ -285,7 +285,7 @@ class TestMisprints:
         assert error.max() == pytest.approx(gap, rel=0, abs=small)
         assert np.flatnonzero(error > small).tolist() == [4, 5, 8, 9, 10]
         rising, falling = (("first", "second", "third")[np.argmax(error[begin:] > small)] for begin in (2, 7))
-        assert f"branches {gap} apart, the composition is off by {gap} from the {rising} sample of a rising pl" in errata
+        assert f"branches {gap} apart, the composition is off by {gap} from the {rising} sample of a rising" in errata
         assert f"or the {falling} of a falling one; with the right rule, only by rounding |" in errata
         envelope = TanhEnvelope((a0, a1, 0.0, 0.0), (a0, a1, 0.0, gap))
         model = Cascade(PI([0.0], [1.0]), (envelope,), 0.0, (-2.0, 2.0))
