@@ -25,10 +25,11 @@ static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_
     (void)w;
 }
 #elif defined(HYSTGEN_HAS_CORNERS)
-/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. */
+/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. The
+   kink from which w was solved is this one unless w has been rounded down to it, or limited. */
 HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
-    if (x > hystgen_along(&self->here, self->here.input)) {
+    if (x > hystgen_along(&self->here, self->here.input) && x <= self->kink.input) {
         self->kink.output = x - 1;
         hystgen_find(&hystgen_model_curve, &self->here, self->corner, &self->kink, false);
     }
