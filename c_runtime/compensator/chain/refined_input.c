@@ -18,15 +18,8 @@ static inline hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *
     (void)w;
     return a;
 }
-
-/* The solution w of engine corners is used as it is. */
-static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
-    (void)self;
-    (void)w;
-}
 #elif defined(HYSTGEN_HAS_CORNERS)
-/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. The
-   kink from which w was solved is this one unless w has been rounded down to it, or limited. */
+/* The last kink before w: that of the solve, unless rounding or a limit took w back to it. */
 HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
     if (x > hystgen_along(&self->here, self->here.input) && x <= self->kink.input) {

@@ -13,10 +13,10 @@ from hystgen.plays.corners.corners_float import (
     Memory,
     Start,
     copy_place,
-    forget_line,
     move_to_output,
     plays_step,
     start,
+    take_back,
 )
 from hystgen.plays.slots import (
     DOMAIN,
@@ -53,8 +53,7 @@ def inverse_arrive(m: Memory, v: Any) -> None:
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     """Undo the last step: the actuator went to v instead."""
-    copy_place(m.here, m.undo)
-    forget_line(t.inverse, m)
+    take_back(t.inverse, m)
     m.step.drive[0] = m.step.undo_drive[0]
     m.step.ascending[0] = m.step.undo_ascending[0]
     inverse_arrive(m, v)
