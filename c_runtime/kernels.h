@@ -37,7 +37,7 @@ hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_rea
 hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x);
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
-void hystgen_forget_line(hystgen_plays_t *m);
+void hystgen_take_back(hystgen_plays_t *m, const hystgen_place_t *to);
 void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                             hystgen_real_t output);
 bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,

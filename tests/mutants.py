@@ -274,12 +274,29 @@ KILLED = (
         "led", "q31",
     ),
     Mutant(
-        "what was solved for is not taken back", CHAIN_FLOAT, "hystgen_copy_place(&m->here, &self->undo);\n", "",
+        "a kink that a finer solution was rounded to is kept", CHAIN_FINER,
+        "x <= self->kink.input", "x < self->kink.input",
+        "led", "q31",
+    ),
+    Mutant(
+        "what was solved for is not taken back", CHAIN_FLOAT, "            hystgen_take_back(m, &self->undo);\n", "",
         "creeping", "float32",
     ),
     Mutant(
-        "a line that was taken back leads on", CHAIN_FLOAT, "        hystgen_forget_line(m);\n", "",
+        "a line that was taken back leads on", FLOAT, "? 1 : -1);\n    hystgen_forget_line(m);\n", "? 1 : -1);\n",
         "creeping", "float32",
+    ),
+    Mutant(
+        "the line of a solution leads back beyond its last kink", CHAIN_FLOAT,
+        "k > self->undo.k ? m->start : self->undo.output", "self->undo.output", "led", "float32",
+    ),
+    Mutant(
+        "the line of a solution leads back beyond a corner", CHAIN_FLOAT, " || m->here.depth != self->undo.depth", "",
+        "led", "float32",
+    ),
+    Mutant(
+        "the line of a solution leads on beyond a kink", CHAIN_FLOAT, "m->here.rising ? h >= m->next : h <= m->next",
+        "false", "led", "float32",
     ),
 )  # fmt: skip
 

@@ -26,11 +26,17 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 }
 
 /* Discards the line of the last outputs, so that the next sample searches. */
-HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
-    m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
+static void hystgen_forget_line(hystgen_plays_t *m) {
     m->next = m->here.input;
     m->cap = m->here.input;
     m->behind = m->here.input;
+}
+
+/* Puts the plays back to an earlier place, before any corner left since then. */
+HYSTGEN_API void hystgen_take_back(hystgen_plays_t *m, const hystgen_place_t *to) {
+    hystgen_copy_place(&m->here, to);
+    m->sign = (hystgen_real_t)(to->rising ? 1 : -1);
+    hystgen_forget_line(m);
 }
 
 /* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
@@ -65,8 +71,7 @@ static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment
                                                 unsigned int end, hystgen_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
     while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
-        const hystgen_segment_t *s = &segment[middle];
-        const bool before = x > (by_reach ? s->reach : s->way);
+        const bool before = x > (by_reach ? segment[middle].reach : segment[middle].way);
         k = before ? middle : k;
         end = before ? end : middle;
         middle = (k + end) / 2;
@@ -153,6 +158,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
+        cap = c->rose == HYSTGEN_BOTTOM ? next : cap; /* all plays below its top follow */
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
@@ -210,22 +216,13 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                               hystgen_corner_t *corner, hystgen_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    bool same = false; /* the same plays follow */
-    if (on) {
-        same = m->here.rising ? input < m->next : input > m->next;
-    } else if (m->here.k == 0) {
-        same = m->here.rising ? input > m->behind : input < m->behind;
-    }
-    if (same) {
+    if (on ? (m->here.rising ? input < m->next : input > m->next)
+           : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
-        return m->here.output;
-    }
-    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
-        hystgen_move_in_block(t, m, input)) {
-        return m->here.output;
-    }
-    if (input < m->here.input || input > m->here.input) {
+    } else if (on ? (m->here.rising ? input >= m->cap : input <= m->cap) ||
+                        !hystgen_move_in_block(t, m, input)
+                  : (m->here.rising ? input < m->here.input : input > m->here.input)) {
         (void)hystgen_move_to_input(t, m, corner, input);
     }
     return m->here.output;
@@ -252,6 +249,7 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
     }
     m->here.k = 0;
     m->here.rising = true;
+    m->sign = 1;
     m->here.input = start->center[0][0];
     m->here.output = start->center[0][1];
     hystgen_forget_line(m);

@@ -8,7 +8,7 @@
 void hystgen_operator_init(hystgen_operator_t *self) {
     hystgen_operator_settings_init(self);
 #ifdef HYSTGEN_HAS_CORNERS
-    hystgen_operator_plays_init(self);
+    hystgen_operator_plays_start(self, false);
 #else
     hystgen_loop_init(self->play);
 #endif
@@ -17,7 +17,7 @@ void hystgen_operator_init(hystgen_operator_t *self) {
 
 void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t operator_x) {
 #ifdef HYSTGEN_HAS_CORNERS
-    hystgen_operator_plays_reset(self);
+    hystgen_operator_plays_start(self, true);
 #else
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
 #endif

@@ -13,8 +13,10 @@
 #include "compensator/chain/refined_input.c"
 #include "compensator/chain/signals.c"
 
-/* Discards all results of searches: only the place of the plays is known. */
-static void hystgen_operator_plays_begin(hystgen_operator_t *self) {
+/* Sets all plays to their start values or, at a reset, to 0. Only their place is known then. */
+static void hystgen_operator_plays_start(hystgen_operator_t *self, bool reset) {
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
+                  reset ? hystgen_model_zero : hystgen_model_start, reset ? 0 : HYSTGEN_START_STEP);
     self->kink.output = 0;
     self->kink.input = 0;
     self->kink.k = 0;
@@ -23,19 +25,6 @@ static void hystgen_operator_plays_begin(hystgen_operator_t *self) {
 #ifdef HYSTGEN_INVERSE
     self->sought = false;
 #endif
-}
-
-/* Sets all plays to their start values. */
-static void hystgen_operator_plays_init(hystgen_operator_t *self) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_start,
-                  HYSTGEN_START_STEP);
-    hystgen_operator_plays_begin(self);
-}
-
-/* Sets all plays to 0. */
-static void hystgen_operator_plays_reset(hystgen_operator_t *self) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_zero, 0);
-    hystgen_operator_plays_begin(self);
 }
 
 /* Sum of the plays. */
@@ -83,7 +72,9 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *
     const hystgen_reach_t w = (hystgen_reach_t)hystgen_solve(
         &hystgen_model_curve, &self->here, self->corner, hystgen_asked(h), self->next, &self->kink);
     self->sought = true;
+#ifdef HYSTGEN_HAS_FINE_SIGNAL
     hystgen_inverse_kink_before(self, w);
+#endif
     return w;
 }
 #endif

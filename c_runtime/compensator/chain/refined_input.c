@@ -18,17 +18,11 @@ static inline hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *
     (void)w;
     return a;
 }
-
-/* The solution w of engine corners is used as it is. */
-static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
-    (void)self;
-    (void)w;
-}
 #elif defined(HYSTGEN_HAS_CORNERS)
-/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. */
+/* The last kink before w: that of the solve, unless rounding or a limit took w back to it. */
 HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
-    if (x > hystgen_along(&self->here, self->here.input)) {
+    if (x > hystgen_along(&self->here, self->here.input) && x <= self->kink.input) {
         self->kink.output = x - 1;
         hystgen_find(&hystgen_model_curve, &self->here, self->corner, &self->kink, false);
     }

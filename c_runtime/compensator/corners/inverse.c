@@ -91,8 +91,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    hystgen_copy_place(&m->here, &self->undo);
-    hystgen_forget_line(m);
+    hystgen_take_back(m, &self->undo);
     hystgen_move_to_output(&hystgen_operator_curve, m, self->corner, v);
     self->before = m->here.input;
 }

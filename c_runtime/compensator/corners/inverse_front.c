@@ -16,8 +16,7 @@ static void hystgen_inverse_keep(hystgen_inverse_t *self) {
 
 /* Undoes the last step: the actuator has moved to v instead. */
 HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
-    hystgen_copy_place(&self->plays.here, &self->undo);
-    hystgen_forget_line(&self->plays);
+    hystgen_take_back(&self->plays, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     const hystgen_real_t w = hystgen_operator_arrive(self, v);

@@ -89,7 +89,7 @@ def follow(t: FixedChainTables, s: ChainState, w: int) -> int:
 def seen(t: FixedChainTables, m: FixedMemory, kept: Reals, w: int) -> None:
     """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
     x = along(m, w)
-    if t.number.arriving_bits[0] > 0 and x > along(m, m.here.input[0]):
+    if t.number.arriving_bits[0] > 0 and along(m, m.here.input[0]) < x <= kept[1]:
         keep(kept, find(t.plays, m, x - 1, False))
 
 

@@ -8,12 +8,12 @@ from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import (
     Memory,
     copy_place,
-    forget_line,
     move_in_block,
     move_to_input,
     move_to_output,
     start,
     stop_in_block,
+    take_back,
 )
 from hystgen.plays.slots import (
     DRIVE_MAX,
@@ -92,8 +92,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
         copy_place(m.undo, m.here)
         m.undo.input[0] = m.step.before[0]
         m.undo.output[0] = m.plays.start[0] + (m.step.before[0] - m.plays.begin[0]) * m.plays.gain[0]
-    copy_place(m.here, m.undo)
-    forget_line(t.inverse, m)
+    take_back(t.inverse, m)
     move_to_output(t.inverse, m, v)
     m.step.before[0] = m.here.input[0]
 

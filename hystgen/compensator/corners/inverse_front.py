@@ -10,10 +10,10 @@ from hystgen.plays.corners.corners_fixed import FixedMemory
 from hystgen.plays.corners.corners_float import (
     Memory,
     copy_place,
-    forget_line,
     move_to_output,
     plays_step,
     start,
+    take_back,
 )
 from hystgen.plays.slots import (
     DOMAIN,
@@ -39,8 +39,7 @@ def inverse_keep(m: Memory | FixedMemory) -> None:
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Scalar) -> None:
     """Undo the last step: the actuator went to v instead."""
-    copy_place(m.here, m.undo)
-    forget_line(t.inverse, m)
+    take_back(t.inverse, m)
     m.step.drive[0] = m.step.undo_drive[0]
     m.step.ascending[0] = m.step.undo_ascending[0]
     turn_to(m, v)

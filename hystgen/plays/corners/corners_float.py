@@ -112,12 +112,19 @@ def along(m: Memory, x: Scalar) -> Scalar:
 
 
 @jit(inline=True)
-def forget_line(t: Curve, m: Memory) -> None:
+def forget_line(m: Memory) -> None:
     """Forget the line of the last outputs: the next sample searches."""
-    m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
     m.plays.next[0] = m.here.input[0]
     m.plays.cap[0] = m.here.input[0]
     m.plays.behind[0] = m.here.input[0]
+
+
+@jit(inline=True)
+def take_back(t: Curve, m: Memory) -> None:
+    """Put the plays back to where they were, before any corner left since then."""
+    copy_place(m.here, m.undo)
+    m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
+    forget_line(m)
 
 
 @jit
@@ -176,7 +183,7 @@ def stop_in_block(t: Curve, m: Memory, output: Scalar, to: Scalar) -> None:
     m.here.input[0] = along(m, x) if x < along(m, to) else to
     m.here.output[0] = output
     m.here.k[0] = k
-    forget_line(t, m)
+    forget_line(m)
 
 
 @jit
@@ -231,6 +238,7 @@ def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
         begin = t.way[k] - origin
         y = y + t.reach[k]
         after = t.way[k + 1] - origin
+        cap = after if m.corner.rose[c] == BOTTOM else cap
         if t.reach[top] > room:
             cap = begin + (room - t.reach[k]) * t.slope[k]
         m.plays.from_input[0] = -along(m, origin)
@@ -315,6 +323,7 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         leave_corner(t, m)
     m.here.k[0] = 0
     m.here.rising[0] = 1
+    m.plays.sign[0] = t.literal.one[0]
     m.here.input[0] = s.center[0, 0]
     m.here.output[0] = s.center[0, 1]
-    forget_line(t, m)
+    forget_line(m)

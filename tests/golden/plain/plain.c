@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 f7e4503f9bb60cafb2050ba9fe2edc14f50f279a0f0ae698be7ea930c6350da8, without this line
+ * Text: sha256 933e437b19beba55aaf52fd70b16a39dcc62d8b6e696522872ce5d415bfb5695, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -97,10 +97,16 @@ static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 
 /* Discards the line of the last outputs, so that the next sample searches. */
 static void plain_forget_line(plain_plays_t *m) {
-    m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
     m->behind = m->here.input;
+}
+
+/* Puts the plays back to an earlier place, before any corner left since then. */
+static void plain_take_back(plain_plays_t *m, const plain_place_t *to) {
+    plain_copy_place(&m->here, to);
+    m->sign = (plain_real_t)(to->rising ? 1 : -1);
+    plain_forget_line(m);
 }
 
 /* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
@@ -134,8 +140,7 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
         unsigned int end, plain_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
     while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
-        const plain_segment_t *s = &segment[middle];
-        const bool before = x > (by_reach ? s->reach : s->way);
+        const bool before = x > (by_reach ? segment[middle].reach : segment[middle].way);
         k = before ? middle : k;
         end = before ? end : middle;
         middle = (k + end) / 2;
@@ -221,6 +226,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
+        cap = c->rose == PLAIN_BOTTOM ? next : cap; /* all plays below its top follow */
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
@@ -294,6 +300,7 @@ PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_cor
     }
     m->here.k = 0;
     m->here.rising = true;
+    m->sign = 1;
     m->here.input = start->center[0][0];
     m->here.output = start->center[0][1];
     plain_forget_line(m);
@@ -405,8 +412,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    plain_copy_place(&m->here, &self->undo);
-    plain_forget_line(m);
+    plain_take_back(m, &self->undo);
     plain_move_to_output(&plain_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
 }

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 2cd1f0494dcef757da30fdf3ba544be7e505e59f34963b63bd539d879c2ff182, without this line
+ * Text: sha256 87014f843b327c29de853762bc803d0c9dc8213d9b0086a2c30860619b2afb49, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -490,10 +490,16 @@ static inline two_branches_real_t two_branches_along(const two_branches_plays_t 
 
 /* Discards the line of the last outputs, so that the next sample searches. */
 static void two_branches_forget_line(two_branches_plays_t *m) {
-    m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
     m->behind = m->here.input;
+}
+
+/* Puts the plays back to an earlier place, before any corner left since then. */
+static void two_branches_take_back(two_branches_plays_t *m, const two_branches_place_t *to) {
+    two_branches_copy_place(&m->here, to);
+    m->sign = (two_branches_real_t)(to->rising ? 1 : -1);
+    two_branches_forget_line(m);
 }
 
 /* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
@@ -528,8 +534,7 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
         unsigned int k, unsigned int end, two_branches_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
     while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
-        const two_branches_segment_t *s = &segment[middle];
-        const bool before = x > (by_reach ? s->reach : s->way);
+        const bool before = x > (by_reach ? segment[middle].reach : segment[middle].way);
         k = before ? middle : k;
         end = before ? end : middle;
         middle = (k + end) / 2;
@@ -616,6 +621,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
+        cap = c->rose == TWO_BRANCHES_BOTTOM ? next : cap; /* all plays below its top follow */
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
@@ -674,22 +680,14 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    bool same = false; /* the same plays follow */
-    if (on) {
-        same = m->here.rising ? input < m->next : input > m->next;
-    } else if (m->here.k == 0) {
-        same = m->here.rising ? input > m->behind : input < m->behind;
-    }
-    if (same) {
+    if (on ? (m->here.rising ? input < m->next : input > m->next)
+            : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
-        return m->here.output;
-    }
-    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
-            two_branches_move_in_block(t, m, input)) {
-        return m->here.output;
-    }
-    if (input < m->here.input || input > m->here.input) {
+    } else if (on
+            ? (m->here.rising ? input >= m->cap : input <= m->cap) ||
+                !two_branches_move_in_block(t, m, input)
+            : (m->here.rising ? input < m->here.input : input > m->here.input)) {
         (void)two_branches_move_to_input(t, m, corner, input);
     }
     return m->here.output;
@@ -716,6 +714,7 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
     }
     m->here.k = 0;
     m->here.rising = true;
+    m->sign = 1;
     m->here.input = start->center[0][0];
     m->here.output = start->center[0][1];
     two_branches_forget_line(m);
@@ -839,8 +838,7 @@ static void two_branches_inverse_keep(two_branches_inverse_t *self) {
 /* Undoes the last step: the actuator has moved to v instead. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
         two_branches_real_t v) {
-    two_branches_copy_place(&self->plays.here, &self->undo);
-    two_branches_forget_line(&self->plays);
+    two_branches_take_back(&self->plays, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     const two_branches_real_t w = two_branches_inverse_arrive(self, v);
