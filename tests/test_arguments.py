@@ -61,8 +61,8 @@ SIGNALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "nothing": (lambda: MODEL.simulate(None), TypeError, "not None"),
     "a record": (lambda: MODEL.simulate(Record("a", T, V)), TypeError, "not a Record"),
     "a hole": (lambda: MODEL.simulate([1.0, None]), TypeError, "real numbers"),
-    "code that is none": (lambda: MODEL.simulate([0.5], "q15"), ValueError, "whole numbers from -32768 to 32767"),
-    "code that is nan": (lambda: MODEL.simulate([np.nan], "q15"), ValueError, "whole numbers from -32768"),
+    "code that is none": (lambda: MODEL.simulate([0.5], "q15"), ValueError, "integers from -32768 to 32767"),
+    "code that is nan": (lambda: MODEL.simulate([np.nan], "q15"), ValueError, "integers from -32768"),
     "arithmetic": (lambda: MODEL.simulate(V, "float16"), ValueError, "'float16' is none of float32"),
     "engine": (lambda: MODEL.simulate(V, "float32", engine="steam"), ValueError, "'steam' is none of auto, corners"),
     "operator": (lambda: MODEL.session("sideways"), ValueError, "'sideways' is none of forward, inverse"),
@@ -166,7 +166,7 @@ def test_wrong_options_of_a_fit(name: str, tmp_path: Path, monkeypatch: pytest.M
 def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
     for options, error, words in (
         ({"hold": REC}, TypeError, "did you mean holdout"), ({"history": 3}, TypeError, "history is a list"),
-        ({"rest": "a"}, TypeError, "rest is a number of seconds"), ({"effects": ["my.py"]}, TypeError, "are classes"),
+        ({"rest": "a"}, TypeError, "rest is a number of seconds"), ({"effects": ["my.py"]}, TypeError, "must be classes"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.diagnose(MODEL, REC, **options), error, words)
     for options, error, words in (

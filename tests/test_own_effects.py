@@ -409,9 +409,9 @@ BAD_PYTHON = {
     "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
     "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
     "not linear": ("    return s[0]\n\n\nclass", "    return s[0] + t[RATE]\n\n\nclass", "its block is not linear"),
-    "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
-    "other at rest": ("\n    return y", "\n    return product(t[RATE], y)", "one undoes the other"),
-    "gain": ("    return s[0]\n\n\nclass", "    return s[0] + s[0]\n\n\nclass", "does not stay where rest leaves it"),
+    "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay at rest"),
+    "other at rest": ("\n    return y", "\n    return product(t[RATE], y)", "they must be inverse"),
+    "gain": ("    return s[0]\n\n\nclass", "    return s[0] + s[0]\n\n\nclass", "does not stay at rest"),
     "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
 }  # fmt: skip
 
@@ -433,12 +433,12 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
 
 SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
 ONLY_FLOAT = {
-    "another input": ([SOFT], "its solve does not give the input for which absorb returns the output asked for"),
+    "another input": ([SOFT], "its solve does not return the input for which absorb returns the requested output"),
     "memory": ([("    return s[0] + product", "    s[1] = y\n    return s[0] + product"),
                 ('("reached",)', '("reached", "asked")'),
                 ("    s[0] = x\n    return x", "    s[0] = x\n    s[1] = x\n    return x"),
                 ("    return s[0]\n\n\nclass", "    s[1] = s[0]\n    return s[0]\n\n\nclass")],
-               "its solve changes the memory, which fixed point bounds by what absorb and rest do"),
+               "its solve changes the memory, but fixed point bounds only what absorb and rest do"),
 }  # fmt: skip
 
 

@@ -29,7 +29,7 @@ def started(t: FloatChainTables, s: ChainState) -> Scalar:  # noqa: ARG001  as i
 
 @jit
 def follow(t: FloatChainTables, s: ChainState, w: Scalar) -> Scalar:
-    """Move the plays with their input w. Returns their sum."""
+    """Move the plays to input w. Returns their sum."""
     m: Memory = s.corners
     if not s.own.inverse[0]:
         return plays_step(t.plays.forward, m, w)
