@@ -956,7 +956,7 @@ def memory_is_that_of_the_compiler(one: Model, arithmetic: str, engine: str, tmp
 
 
 REFUSED = {
-    "name: drift, rate: 0.1": "a clock that runs alone",
+    "name: drift, rate: 0.1": "a clock that runs by itself",
     "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001": "own heat",
     "name: noncongruent, coefficients: [[9], [9], [9], [9], [9], [9]]": "there is no inverse",
 }

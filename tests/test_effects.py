@@ -1146,7 +1146,7 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
     (OWN.replace("user:own", "own"), r'own.py: class Own needs a name of its own; write name: Literal["user:my_'),
     (OWN.replace("Literal[\"user:own\"]", "str"), r"own.py: class Own needs a name of its own"),
     (OWN.replace("    place: ClassVar[Place] = Place.ADDED\n", ""), r"own.py: class Own needs a place; write place: "),
-    (OWN.replace("def added", "def addd"), r"own.py: class Own has place added, for which it has to define added"),
+    (OWN.replace("def added", "def addd"), r"own.py: class Own has place added, so it has to define added"),
     (OWN.replace("height: float", "height: nothing"), r"own.py:7: NameError: name 'nothing' is not defined"),
 ])  # fmt: skip
 def test_a_wrong_file_gives_one_message(tmp_path: Path, text: str | None, said: str) -> None:
@@ -1370,7 +1370,7 @@ def test_show_says_how_the_inverse_reads_the_reference(
     assert f"compensation: {usual} of the present one: no ringing, no delay" in out.splitlines()[-1]
     for option, said, last in (
         ("resonance: notch", "a notch, see below", "    Resonance: after a step of the reference the stage does not"),
-        ("resonance: none", "none, as emit.compensation.resonance says", "        compensation: none"),
+        ("resonance: none", "none, as emit.compensation.resonance sets", "        compensation: none"),
         ("noise_gain: 8", usual, "    Noise: references are averaged twice over"),
         ("quiet: true, noise_gain: 1000", usual, "    Quiet: after 34 equal references"),
     ):

@@ -337,7 +337,7 @@ def test_simulating_takes_codes() -> None:
     model = Model(parse_parameters(FILES["plain"], "plain.yaml"))
     with pytest.raises(ValueError, match="integers from -32768 to 32767"):
         model.simulate(np.array([0.5]), arithmetic="q15")
-    with pytest.raises(ValueError, match="whole numbers"):
+    with pytest.raises(ValueError, match="codes, integers"):
         model.simulate(np.array([40000]), arithmetic="q15")
 
 

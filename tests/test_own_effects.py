@@ -393,14 +393,14 @@ def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
 
 
 SOLVED, NUMBERS = "    return s[0] + product", "return [rate, 1.0 / rate]"
-PRECISE = "is of another precision than the C's; put it in the table"
+PRECISE = "does not have the precision of the C; put it in the table"
 BAD_PYTHON = {
     "number": (SOLVED, "    return 1.0 + s[0] + product", f":24: the number 1.0 in solve {PRECISE}"),
     "named number": (SOLVED, "    return RATE + product", f":24: the number RATE in solve {PRECISE}"),
     "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":24: solve has np.abs(s[0]); write it"),
     "times": (SOLVED, "    return s[0] * s[0] + product", ":24: solve has s[0] * s[0]; write it with +, -, product"),
     "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a number of the"),
-    "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
+    "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, so it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
     "word": ('("reached",)', '("while",)', "has 'while' among the names of its table and state"),
