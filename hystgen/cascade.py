@@ -6,10 +6,11 @@ actuator: stages in order from the drive, the play sum, an output offset and the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import remarks

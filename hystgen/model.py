@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, remarks, tables

@@ -173,16 +173,15 @@ STATES = [
     (r"(    return \(NAME_play_t\)rest;\n)", r"    WITHIN(rest, PLAY);\n\1"),
     (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
     (r"(void NAME_put\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
-    (r"(        NAME_move\(i, play, w\);\n)", r"\1        WITHIN(play[i], PLAY);\n"),
+    (r"(        NAME_move\(i, play, \*from, w\);\n)", r"\1        WITHIN(play[i], PLAY);\n"),
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
-    (r"        const NAME_play_t middle = low \+ \(NAME_play_t\)\(size / 2u\);\n",
-     r"        const int64_t between = (int64_t)low + (int64_t)(size / 2u);\n        WITHIN(between, INPUT);\n"
-     r"        const NAME_play_t middle = (NAME_play_t)between;\n"),
-    (r"(NAME_inverse_nearer\(const [^{]*\{\n)", r"\1    WITHIN(low, INPUT);\n"),
-    (r"    return \(NAME_play_t\)\((w > play \? [^;]*|play\[[0i]\] \+\s+NAME_[^;]*)\);\n",
+    (r"        search->input = \(NAME_play_t\)\((search->low [^;]*)\);\n",
+     r"        const int64_t between = \1;\n        WITHIN(between, INPUT);\n"
+     r"        search->input = (NAME_play_t)between;\n"),
+    (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # no facts, but where Eva is to stop widening, and what it is to look at case by case
-    (r"(    while \(size > 1u\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
+    (r"(    for \(bits = \w+; bits > 0; bits /= 2u\) \{\n)", r"    /*@ loop unroll 6; */\n\1"),
     (r"(        const bool before = inside < ([^;]*);\n)", r"        /*@ split inside < \2; */\n\1"),
 ]  # fmt: skip
 

@@ -166,7 +166,7 @@ def test_wrong_options_of_a_fit(name: str, tmp_path: Path, monkeypatch: pytest.M
 def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
     for options, error, words in (
         ({"hold": REC}, TypeError, "did you mean holdout"), ({"history": 3}, TypeError, "history is a list"),
-        ({"rest": "a"}, TypeError, "rest is a number of seconds"), ({"effects": ["my.py"]}, TypeError, "must be classes"),
+        ({"rest": "a"}, TypeError, "rest is a number of seconds"), ({"effects": ["my.py"]}, TypeError, "be classes"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.diagnose(MODEL, REC, **options), error, words)
     for options, error, words in (

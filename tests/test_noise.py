@@ -145,7 +145,7 @@ def test_the_motion_is_as_late_as_printed(preview: int | None) -> None:
 @pytest.mark.parametrize(("period", "loss"), [(50, "1.5"), (200, "0.093")])
 def test_a_sine_loses_what_is_printed(period: int, loss: str) -> None:
     one = model(LAG, noise_gain=5.0)
-    assert re.search(rf"{re.escape(loss)} % with {period} samples", emitted_files(one)["noisy.h"].replace("\n * ", " "))
+    assert re.search(rf"{re.escape(loss)} % at {period} samples", emitted_files(one)["noisy.h"].replace("\n * ", " "))
     numbers = compiled(one)
     t = np.arange(8 * period) * T
     u = 1.5 + 3.0 * np.sin(2.0 * np.pi * np.arange(len(t)) / period)

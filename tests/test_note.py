@@ -225,7 +225,7 @@ class TestMisprints:
         v = np.array([0.0, *[1.0, -1.0] * 10])
         variation = np.abs(np.diff(v)).sum()
         assert variation > 7 * 2 * EXAMPLE_1.thresholds[-1]
-        assert f"ten swings of +-1 have a total variation of {variation:g}, seven times what is asked" in errata
+        assert f"ten swings of +-1 have a total variation of {variation:g}, seven times what is required" in errata
         high, low = (PI(EXAMPLE_1.thresholds, EXAMPLE_1.weights, start).simulate(v)[-1] for start in (1.0, -1.0))
         rounding = error_bounds(Cascade(EXAMPLE_1, (), 0.0, (-1.0, 1.0)), "float64", "corners").forward
         assert high - low == pytest.approx(0.9, rel=0, abs=rounding)
@@ -285,8 +285,8 @@ class TestMisprints:
         assert error.max() == pytest.approx(gap, rel=0, abs=small)
         assert np.flatnonzero(error > small).tolist() == [4, 5, 8, 9, 10]
         rising, falling = (("first", "second", "third")[np.argmax(error[begin:] > small)] for begin in (2, 7))
-        assert f"branches {gap} apart: from the {rising} sample of a rising plateau on, or the {falling} of a" in errata
-        assert f"falling one, the composition is off by {gap}, with the right rule by rounding |" in errata
+        assert f"branches {gap} apart, the composition is off by {gap} from the {rising} sample of a rising" in errata
+        assert f"or the {falling} of a falling one; with the right rule, only by rounding |" in errata
         envelope = TanhEnvelope((a0, a1, 0.0, 0.0), (a0, a1, 0.0, gap))
         model = Cascade(PI([0.0], [1.0]), (envelope,), 0.0, (-2.0, 2.0))
         assert off(model.simulate(model.inverse().simulate(u)), u) <= small

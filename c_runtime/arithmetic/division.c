@@ -25,6 +25,50 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
+/* The lower 31 bits, which are all that there are of what this is called with. */
+static inline uint32_t hystgen_low_31(uint64_t x) {
+    return (uint32_t)x & 0x7fffffffu;
+}
+
+/* x > 0 as a mantissa of 31 bits. Returns the bits that it is shifted up by, before its upper word
+   is taken. */
+static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
+    unsigned int raised = 0;
+    unsigned int bits;
+    for (bits = HYSTGEN_WORD; bits > 0; bits /= 2u) {
+        if (x >> (2u * HYSTGEN_WORD - 1u - bits) == 0) {
+            x = (x & (UINT64_MAX >> bits)) << bits;
+            raised |= bits;
+        }
+    }
+    *mantissa = hystgen_low_31(x >> HYSTGEN_WORD);
+    return raised;
+}
+
+/* x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no less than
+   2^60 beyond that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17 y, a 17th off, and
+   each step squares that share. */
+HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y) {
+    uint32_t number;
+    uint32_t divisor;
+    if (x == 0) {
+        return 0;
+    }
+    const int raised = (int)hystgen_mantissa((uint64_t)x, &number);
+    const int lifted = (int)hystgen_mantissa((uint64_t)y, &divisor);
+    uint32_t rate = 3031741620u - (uint32_t)(hystgen_wide(divisor, 2021161080u) >> 31);
+    unsigned int i;
+    for (i = 0; i < 3u; ++i) {
+        const uint32_t off = 0x80000000u - hystgen_low_31(hystgen_wide(divisor, rate) >> 31);
+        rate = (uint32_t)(hystgen_wide(rate, off) >> 30);
+    }
+    const int shift = 60 + raised - lifted;
+    if (shift > 62) {
+        return 0;
+    }
+    return (int64_t)(((hystgen_wide(number, rate) >> (shift > 0 ? shift : 0)) + 1u) >> 1);
+}
+
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hystgen.arithmetic.description import Arithmetic
-from hystgen.basics.frozen import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-
-from hystgen.basics.frozen import dataclass
+from dataclasses import dataclass
 
 Path = tuple[str | int, ...]
 """Path of a value in the file: keys and list indices from the top level down."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.frozen import dataclass
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.plays.play_sum import PlaySum

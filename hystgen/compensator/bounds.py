@@ -25,10 +25,10 @@ knows on which side of it every drive lies, up to the rounding of G_R^-1 in doub
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage

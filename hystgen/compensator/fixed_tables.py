@@ -23,6 +23,7 @@ import bisect
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import partial
@@ -31,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.arithmetic import FIXED
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import FormatError, Path, counted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import error_bounds, largest_sum

@@ -6,6 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import FormatError
 from hystgen.chain.static import UNBOUNDED, StaticModel
 from hystgen.compensator.bounds import CornerRoundings, error_bounds

@@ -24,14 +24,31 @@ PLAIN, DILATED, RELAXING, DASHPOT = range(4)
 STRAIGHT, POLYNOMIAL, CENTRE = range(3)
 """How plays move, and how they are bent."""
 
-SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LARGEST_INPUT, HALF, SEEN = range(10)
+(
+    SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, INVERSE_BUMP, TANH_CENTRE,
+    LEAST_INPUT, LARGEST_INPUT, HALF, RATE, CLOSE, SEEN,
+) = range(13)
 """Places in `MovingTables.number`."""
+
+NEWTON_TRIES = 8
+"""Tries of a search in floating point by Newton's method, before it halves what is left of its interval: 2 to 3 are
+enough on smooth references, and 5 after jumps."""
+
+
+SECANTS = 10
+"""Tries of a search in fixed point by secants, before it halves what is left of its interval: 3 to 5 are enough on
+smooth references, and 9 after jumps."""
+
+
+SECANT = 64
+"""[steps of the plays' input] Least length of a secant: rounding of a play by half a step is then 2 % of its slope."""
 
 
 class MovingTables(NamedTuple):
     """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
-    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
-    bisections of the search."""
+    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials;
+    `halves`: halvings of a search that Newton's method leaves unfinished; `turns`: steps to the reciprocal of a
+    slope."""
 
     moves: int
     bends: int
@@ -40,6 +57,7 @@ class MovingTables(NamedTuple):
     curve: Reals
     number: Reals
     halves: int
+    turns: int
     scanned: int  # 1 for viscous plays with one time constant and no bend
     share: Reals  # p_i b1 (n + 1,), if scanned
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
@@ -53,10 +71,11 @@ class MovingTables(NamedTuple):
 
 class FixedMovingTables(NamedTuple):
     """The same in fixed point. `first`, `second`: factors (n + 1, 2); `farthest`: the largest input that a search
-    tries; `relaxed`: tables of plays with the slopes that viscous plays with one time constant have in a step; `bump`:
-    curves of bent plays less the plays themselves, with `bump_bits` bits below a step of their input; `bump_of`
-    (n + 1,): the curve of each play; `yields` (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a
-    step, for stretches up to `stretch`; `seen`: a factor."""
+    tries; `near`: the least that half a step of the input changes the sum by; `relaxed`: tables of plays with the
+    slopes that viscous plays with one time constant have in a step; `bump`: curves of bent plays less the plays
+    themselves, with `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields`
+    (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a
+    factor."""
 
     moves: int
     bends: int
@@ -64,6 +83,7 @@ class FixedMovingTables(NamedTuple):
     first: Reals
     second: Reals
     farthest: int
+    near: int
     relaxed: Any  # `hystgen.compensator.layout.FixedTables`
     bump: Bends
     bump_of: Counts
@@ -135,7 +155,8 @@ class Moves(NamedTuple):
     """The functions of moving plays in one arithmetic, of the tables m, thresholds r, the index i of a play, the memory
     s of all plays, their rounding remainders and their input w.
 
-    `moved`: play i after its input has gone to w; `move`: it moves there; `put`: it is put to rest at a place; `rest`:
+    `moved`: play i after its input has gone to w; `tried`: that, and its change per change of w, times a weight, in
+    floating point; `move`: it moves there; `put`: it is put to rest at a place; `rest`:
     where it would come to rest with its input held. `follow`: all plays with one time constant follow their input,
     which gives their sum; `input`: that at which their sum is h.
     """
@@ -146,13 +167,21 @@ class Moves(NamedTuple):
     rest: Function  # of m, r, i, s
     follow: Function  # of m, plays, s, w
     input: Function  # of m, plays, s, h
+    tried: Any = None  # of m, r, i, s, lost, w and the weight
+
+
+class Bending(NamedTuple):
+    """The functions of bent plays in one arithmetic: the contribution of play i at z; and in floating point its change
+    per change of w, from that of the play itself."""
+
+    bent: Function  # of m, plays, i, z
+    steep: Any = None  # of m, i, z, the contribution there and the change of the play
 
 
 @dataclass(frozen=True)
 class PlaysPart(Generic[T, F]):
     """An effect on plays: `of` makes what it tells of a model's plays, from the effect, thresholds and weights;
-    `floating`: its functions, `Moves` or the contribution of play i at z, of m, plays, i and z; `coded` loads them in
-    fixed point."""
+    `floating`: its functions, `Moves` or `Bending`; `coded` loads them in fixed point."""
 
     of: Callable[..., T]
     floating: F

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.basics.frozen import dataclass
 from hystgen.emission.compensator import ConstantTable, Effects, EmittedStage, Field, Form, Glue, Writer
 from hystgen.emission.runtime import template
 from hystgen.emission.text import literal, operand
@@ -217,7 +217,7 @@ def effects(
 
 def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[EmittedStage]) -> Glue:
     """The glue of a model with effects."""
-    from hystgen.effects.plays import DASHPOT
+    from hystgen.effects.plays import DASHPOT, STRAIGHT
 
     t, chain = compiled.tables, ChainBlocks.of(compiled.tables, operators)
     shape = Shape.of(t, form)
@@ -231,7 +231,8 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == DASHPOT)
-    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched) for op in operators}
+    bent = t.moving.bends != STRAIGHT
+    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched, bent) for op in operators}
     return Glue(fields, "\n".join(functions), calls)
 
 
@@ -239,7 +240,7 @@ def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
     """The glue of a model without effects in engine loop, which is a chain without blocks."""
     shape = Shape(form)
     functions = [_functions(op, shape) for op in operators]
-    return Glue({op: instance(op, shape, (), plays, 0, False) for op in operators}, "\n".join(functions), {})
+    return Glue({op: instance(op, shape, (), plays, 0) for op in operators}, "\n".join(functions), {})
 
 
 _PLAYS = "play 0 is the input of the plays"
@@ -247,7 +248,9 @@ _KEPT = "; the rounding remainder of each follows"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
-def instance(op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(
+    op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: int, sought: bool = False, bent: bool = False
+) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", t.taps
     waiting = 0 if inverse else t.waiting
@@ -282,7 +285,8 @@ def instance(op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: 
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * moving,
+        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * bent,
+        *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
     ]
 
 

@@ -7,11 +7,10 @@ import math
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.layout import FixedTables, Tables
@@ -289,8 +289,8 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     """Operations of the plays of a model with effects in engine loop: multiplications, further ones per play,
     comparisons, further ones per play, and tanh per play.
 
-    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, each bisection
-    of which sums all of them.
+    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, and each
+    try sums all of them, with the slope of the sum in floating point.
     """
     from hystgen.effects import plays
 
@@ -309,28 +309,46 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         plays.RELAXING: ((factor, 2 + more), (factor, 2 + more)),
         plays.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
-    bent, looked, tanh, sums, halved = _bent(m)
+    bent, looked, tanh, steep = _bent(m)
     twice = 1 + (m.moves == plays.RELAXING)  # a play's contribution, and where it will rest
-    sums, halved = sums * inverse, halved * inverse
+    tries, beside = _tries(m) if inverse else (0, (0, 0))
+    if isinstance(m, plays.MovingTables):
+        sloped = {plays.DILATED: (1, 1), plays.RELAXING: (1, 1), plays.DASHPOT: (4, yields + 2)}.get(m.moves, (0, 1))
+        steep, compared = steep + sloped[0], sloped[1]
+    else:
+        compared = 0
     return (
-        sums + 1 + halved,
-        sums * (1 + moved[0] + bent) + 1 + moved[0] + kept[0] + twice * bent,
-        2 * sums + 15 + 6 * inverse,
-        sums * (1 + moved[1] + looked) + 2 + moved[1] + kept[1] + twice * looked,
-        tanh * (sums + twice),
+        tries + 1 + beside[0],
+        tries * (1 + moved[0] + bent + steep) + 1 + moved[0] + kept[0] + twice * bent,
+        beside[1] + 15 + 6 * inverse,
+        tries * (1 + moved[1] + looked + compared) + 2 + moved[1] + kept[1] + twice * looked,
+        tanh * (tries + twice),
     )
 
 
-def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]:
-    """Multiplications, comparisons and tanh of a bend per play; sums over the plays in a search, and multiplications in
-    its halvings."""
+QUOTIENT = (8, 17)
+"""Multiplications and comparisons of a quotient."""
+
+
+def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
+    """Most tries of a search, and its multiplications and comparisons beside those of the sums."""
     from hystgen.effects import plays
 
-    straight = m.bends == plays.STRAIGHT
     if isinstance(m, plays.FixedMovingTables):
-        sums = 3 + (2 * m.farthest).bit_length()
-        if straight:
-            return 0, 0, 0, sums, 0
-        return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0, sums, 0
-    bent = 0 if straight else m.curve.shape[1] + 3 if m.bends == plays.POLYNOMIAL else 2
-    return bent, 0, int(m.bends == plays.CENTRE), 1 + m.halves, m.halves
+        tries = 1 + plays.SECANTS + (2 * m.farthest + 1).bit_length()
+        return tries, (2 * QUOTIENT[0] * plays.SECANTS, 2 * QUOTIENT[1] * plays.SECANTS + 11 * tries)
+    tries = plays.NEWTON_TRIES + m.halves
+    return tries, (2 * (m.turns + 1) * plays.NEWTON_TRIES + tries, 5 * tries)
+
+
+def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int]:
+    """Multiplications, comparisons and tanh of a bend per play, and multiplications of its slope."""
+    from hystgen.effects import plays
+
+    if m.bends == plays.STRAIGHT:
+        return 0, 0, 0, 0
+    if isinstance(m, plays.FixedMovingTables):
+        return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0, 0
+    if m.bends == plays.CENTRE:
+        return 2, 0, 1, 5
+    return m.curve.shape[1] + 3, 0, 0, 2 * m.curve.shape[1] + 3

@@ -132,7 +132,12 @@ class FixedForm(Form):
         from hystgen.compensator.chain import moving
 
         plays: FixedMovingTables = t.moving
-        numbers: list[Macro] = [("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search")]
+        numbers: list[Macro] = [
+            ("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search"),
+            ("NEAR", operand(plays.near), "least change of the sum with half a step of the input"),
+            ("SECANT", f"{moving.SECANT}", "least length of a secant, in steps of the input"),
+            ("SECANTS", f"{moving.SECANTS}u", "tries of a search by secants, before those by halving"),
+        ]
         if plays.scanned:
             arrays = [
                 writer.line("factor_t", f"relaxing_{name}", _factor(rows[1, :]))

@@ -109,9 +109,12 @@ class FloatingForm(Form):
             ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
             ("CENTRE", moving.MIDDLE, "of the loops with another weight"),
             ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
+            ("INVERSE_BUMP", moving.INVERSE_BUMP, ""),
             ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
             ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
             ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
+            ("RATE", moving.RATE, "reciprocal of the sum's mean slope"),
+            ("CLOSE", moving.CLOSE, "distance of the sum at which a search ends"),
             ("STANDING_SHARE", moving.SEEN, "share of a step after which the input is taken as standing still"),
         )
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
@@ -128,7 +131,9 @@ class FloatingForm(Form):
         return arrays, [
             *((name, operand(plays.number[place]), comment) for name, place, comment in numbers),
             ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
-            ("HALVES", f"{plays.halves}u", "steps of the search"),
+            ("NEWTON_TRIES", f"{moving.NEWTON_TRIES}u", "tries of a search by Newton's method"),
+            ("HALVES", f"{plays.halves}u", "and by halving after them"),
+            ("TURNS", f"{plays.turns}u", "steps to the reciprocal of a slope"),
             ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
         ]
 

@@ -11,9 +11,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import replace
-
-from hystgen.basics.frozen import dataclass
+from dataclasses import dataclass, replace
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")

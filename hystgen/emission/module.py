@@ -6,9 +6,9 @@ import dataclasses
 import importlib
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hystgen.basics.frozen import dataclass
 from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Names, Numbers, Writer

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import dataclass
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import printable
 
 OPTIONS = {

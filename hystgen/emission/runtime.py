@@ -12,6 +12,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
@@ -19,7 +20,6 @@ from typing import ClassVar
 import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
-from hystgen.basics.frozen import dataclass
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")

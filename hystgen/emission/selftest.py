@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hystgen.basics.frozen import dataclass
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS

@@ -39,6 +39,11 @@ class FixedPlayTables(PlayTables, Protocol):
     def shift(self) -> Reals: ...
 
 
+LINE = 3031741620
+FALL = 2021161080
+"""The reciprocal of x in 1/2 .. 1 is 48/17 - 32/17 x to 1/17: 48/17 in units of 2^-30, 16/17 in units of 2^-31."""
+
+
 @jit
 def nearest(x: int, bits: int) -> int:
     """x / 2^bits to the nearest integer, ties away from zero."""
@@ -69,6 +74,34 @@ def divide_by_slope(t: FixedPlayTables, d: int, k: int) -> int:
     shift = t.shift[k]
     quotient = (d >> 32) * r + (((d & 0xFFFFFFFF) * r) >> 32)
     return ((quotient >> (shift - 1)) + 1) >> 1
+
+
+@jit
+def mantissa(x: int) -> tuple[int, int]:
+    """Whole x > 0 as a mantissa of 31 bits, and the bits that it is shifted up: first below 2^63."""
+    raised = 0
+    for bits in (32, 16, 8, 4, 2, 1):
+        if x >> (63 - bits) == 0:
+            x = x << bits
+            raised += bits
+    return x >> 32, raised
+
+
+@jit
+def quotient(x: int, y: int) -> int:
+    """x / y to a part in 2^28 and to the nearest whole number, for whole x >= 0 and y > 0 below 2^62; no less than 2^60
+    beyond that."""
+    if x == 0:
+        return x
+    number, raised = mantissa(x)
+    divisor, lifted = mantissa(y)
+    rate = LINE - ((divisor * FALL) >> 31)
+    for _ in range(3):  # 2^61/divisor: each step squares its share of error, at first 1/17
+        rate = (rate * ((1 << 31) - ((divisor * rate) >> 31))) >> 30
+    shift = 60 + raised - lifted
+    if shift > 62:
+        return x - x
+    return (((number * rate) >> (shift if shift > 0 else 0)) + 1) >> 1
 
 
 @jit

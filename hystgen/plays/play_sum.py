@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self
 
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.arguments import finite_numbers
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import NotInvertibleError, counted
 
 Array = NDArray[np.float64]

@@ -40,6 +40,9 @@
 #define HYSTGEN_LEVEL_DROP 20u
 #define HYSTGEN_LARGEST_LEVEL 782495278648LL
 #define HYSTGEN_LARGEST_INPUT 2147483647
+#define HYSTGEN_NEAR 500
+#define HYSTGEN_SECANT 64
+#define HYSTGEN_SECANTS 10u
 #define HYSTGEN_SHARE_BITS 0u
 #define HYSTGEN_BRAKED_DROP 4u
 #define HYSTGEN_BUMP_DEGREE 5u
@@ -70,11 +73,16 @@ extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_LATE 0.1f
 #define HYSTGEN_KEPT 0.2f
 #define HYSTGEN_STANDING_SHARE 0.3f
+#define HYSTGEN_NEWTON_TRIES 8u
 #define HYSTGEN_HALVES 40u
+#define HYSTGEN_TURNS 4u
+#define HYSTGEN_RATE 1.0f
+#define HYSTGEN_CLOSE 1.0e-6f
 #define HYSTGEN_LEAST_INPUT (-8.0f)
 #define HYSTGEN_LARGEST_INPUT 8.0f
 #define HYSTGEN_CENTRE 0.5f
 #define HYSTGEN_INVERSE_WIDTH 2.0f
+#define HYSTGEN_INVERSE_BUMP 4.0f
 #define HYSTGEN_TANH_CENTRE 0.2f
 #define HYSTGEN_TERMS 2u
 #define HYSTGEN_SCALE 4.0f
@@ -127,6 +135,7 @@ typedef struct {
 #ifndef HYSTGEN_HAS_CORNERS
     hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
     hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+    hystgen_search_t search;
 #else
     bool sought;
 #ifdef HYSTGEN_FIXED

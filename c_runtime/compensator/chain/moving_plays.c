@@ -9,16 +9,16 @@
 #include "effects/catalogue.h"
 
 #ifdef HYSTGEN_HAS_MOVES_APART
-/* Play i after the input of the plays has moved to w. Not inlined, to need less stack. */
+/* Play i after the input of the plays has moved from x to w. Not inlined, to need less stack. */
 HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t w) {
-    return hystgen_moved(i, play, w);
+                                             hystgen_play_t x, hystgen_play_t w) {
+    return hystgen_moved(i, play, x, w);
 }
 #else
-/* Play i after the input of the plays has moved to w. */
+/* Play i after the input of the plays has moved from x to w. */
 static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t w) {
-    return hystgen_moved(i, play, w);
+                                             hystgen_play_t x, hystgen_play_t w) {
+    return hystgen_moved(i, play, x, w);
 }
 #endif
 
@@ -29,10 +29,17 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 }
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
-/* Play i moves while the input of the plays moves to w. */
-static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
-    play[i] = hystgen_reached(i, play, w);
+/* Play i moves while the input of the plays moves from x to w. */
+#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
+HYSTGEN_APART void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
+                                hystgen_play_t w) {
+    play[i] = hystgen_reached(i, play, x, w);
 }
+#else
+static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
+    play[i] = hystgen_reached(i, play, x, w);
+}
+#endif
 
 /* Play i rests at z. */
 static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
@@ -46,6 +53,15 @@ static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *p
                                          const hystgen_sum_t *bent, hystgen_play_t z) {
     return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
 }
+
+/* Play i has moved from z. Updates its contribution. Returns it. */
+static hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play, hystgen_sum_t *bent,
+                                    hystgen_play_t z) {
+    if (play[i] < z || play[i] > z) {
+        return hystgen_bent_anew(i, play[i], bent);
+    }
+    return bent[i];
+}
 #else
 /* Contribution of play i at z: z itself. */
 static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
@@ -55,20 +71,13 @@ static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_pl
     (void)bent;
     return z;
 }
-#endif
 
-#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
-/* Contribution of play i after the input of the plays has moved to w. Not inlined, to need less
-   stack. */
-HYSTGEN_APART hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
-                                          const hystgen_sum_t *bent, hystgen_play_t w) {
-    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
-}
-#else
-/* Contribution of play i after the input of the plays has moved to w. */
-static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
-                                          const hystgen_sum_t *bent, hystgen_play_t w) {
-    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
+/* Contribution of play i: where it is. */
+static inline hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play,
+                                           hystgen_sum_t *bent, hystgen_play_t z) {
+    (void)bent;
+    (void)z;
+    return play[i];
 }
 #endif
 
@@ -76,15 +85,18 @@ static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+    const hystgen_play_t *from = play; /* read for each play: saved across calls, it takes stack */
+#else
+    const hystgen_play_t x = play[0];
+    const hystgen_play_t *from = &x;
+#endif
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_play_t before = play[i];
-        hystgen_move(i, play, w);
-        if (play[i] < before || play[i] > before) {
-            bent[i] = hystgen_bent(i, play[i]);
-        }
-        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+        hystgen_move(i, play, *from, w);
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_rebent(i, play, bent, before);
     }
     play[0] = w;
     return sum;
@@ -98,36 +110,58 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
-        bent[i] = hystgen_bent(i, play[i]);
-        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_bent_anew(i, play[i], bent);
     }
     play[0] = w;
     return sum;
 }
 
+/* Contributions of the plays, if they are bent. */
+static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+    return self->bent;
+#else
+    (void)self;
+    return NULL;
+#endif
+}
+
+/* The plays come to rest with their input at w, and a search in fixed point begins anew. Updates
+   their sum. */
+static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
+#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
+    self->search.slope = hystgen_model_tables.weight[0];
+#endif
+    self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
+}
+
 /* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
-        self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
-        hystgen_relax(self->play, self->bent);
+        hystgen_sum_t *bent = hystgen_operator_bent(self);
+        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+        hystgen_relax(self->play, bent);
     } else {
-        self->level = hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+        hystgen_operator_settle_plays(self, w);
     }
 }
 
 /* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
-    return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
+    hystgen_operator_settle_plays(self, self->play[0]);
+    return self->level;
 }
 
+#ifdef HYSTGEN_FIXED
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
-                                                         hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     if (self->moving) {
         for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_sum_t value = hystgen_value(i, self->play, self->bent, w);
+            const hystgen_sum_t value =
+                hystgen_contributed(i, self->play, hystgen_operator_bent(self),
+                                    hystgen_reached(i, self->play, self->play[0], w));
             sum = sum + hystgen_model_tables.weight[i] * value;
         }
         return sum;
@@ -135,10 +169,64 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+        const hystgen_sum_t value =
+            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
         sum = sum + hystgen_model_tables.weight[i] * value;
     }
     return sum;
 }
+#elif defined(HYSTGEN_HAS_BUMP)
+/* Play i with its input at that of the search. Sets the play's slope. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_tried(hystgen_inverse_t *self, unsigned int i) {
+    const hystgen_real_t w = self->search.input;
+    const hystgen_real_t z = hystgen_tried(i, self->play, w, &self->search.steep);
+    return self->moving ? z : hystgen_resting(i, self->play, w);
+}
+
+/* Adds play i to the sum and the slope of a search. In memory, which needs less stack than numbers
+   that are saved across a call. */
+HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) {
+    hystgen_search_t *search = &self->search;
+    const hystgen_real_t z = hystgen_inverse_tried(self, i);
+    const hystgen_real_t value = hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
+    search->left = search->left + hystgen_model_tables.weight[i] * value;
+    search->slope = search->slope + hystgen_bent_steep(i, z, value, search->steep);
+}
+
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
+   slope of the search to its change per change of w. */
+static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
+    unsigned int i;
+    self->search.left = hystgen_model_tables.weight[0] * w;
+    self->search.slope = hystgen_model_tables.weight[0];
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_inverse_add(self, i);
+    }
+    return self->search.left;
+}
+#else
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
+   slope of the search to its change per change of w. */
+static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
+    hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
+    hystgen_real_t slope = hystgen_model_tables.weight[0];
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_real_t steep;
+        hystgen_real_t z = hystgen_tried(i, self->play, w, &steep);
+        if (!self->moving) {
+            z = hystgen_resting(i, self->play, w);
+        }
+        const hystgen_real_t value =
+            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+        slope = slope + hystgen_bent_steep(i, z, value, steep);
+    }
+    self->search.slope = slope;
+    return sum;
+}
+#endif
 
 #endif

@@ -1,78 +1,157 @@
-/* Operators of a model with effects: the input of moving or bent plays for a given sum, by
-   bisection. Called by chain_calls.c. */
+/* Operators of a model with effects: the input of moving or bent plays for a given sum. Called by
+   chain_calls.c. */
 #include "compensator/chain/model.h"
 #ifndef HYSTGEN_CONFIGURED
 #include "compensator/chain/moving_plays.c"
 #endif
 #include "compensator/chain/signals.c"
 
+/* The search goes on from the input tried last by the slope of the sum, as long as that leads to an
+   input inside the interval and it has not done so too often; else it halves the interval. Both
+   ends of the interval are known to be beyond the solution, so that a wrong slope costs tries and
+   nothing else. */
 #ifdef HYSTGEN_FIXED
-/* The input `low` or the one above it, whichever gives the sum of the plays nearer to `sum`; one
-   input beyond if `sum` is out of reach. */
-HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *self,
-                                                     hystgen_play_t low, hystgen_sum_t sum) {
-    const hystgen_sum_t above = sum - hystgen_inverse_sum(self, low);
-    if (low == HYSTGEN_LARGEST_INPUT) {
-        return (hystgen_reach_t)low + (above > 0 ? 1 : 0);
-    }
-    const hystgen_sum_t below = hystgen_inverse_sum(self, low + 1) - sum;
-    if (above < 0) {
-        return (hystgen_reach_t)low - 1;
-    }
-    if (below < 0) {
-        return (hystgen_reach_t)low + 2;
-    }
-    return (hystgen_reach_t)low + (above > below ? 1 : 0);
+static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
+    return x < 0 ? -x : x;
 }
 
-/* Input of the plays at which their sum is h, by bisection between the present input and the
-   farthest: the nearer of two neighbours. The interval begins at `low` and is `size` long. */
-HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
-                                                    hystgen_signal_t h) {
-    const hystgen_sum_t sum = hystgen_asked(h);
-    hystgen_play_t low = self->play[0];
-    const hystgen_sum_t here = hystgen_inverse_sum(self, low);
-    uint32_t size = here < sum ? (uint32_t)((hystgen_sum_t)HYSTGEN_LARGEST_INPUT - low) : 0u;
-    if (here > sum) {
-        size = (uint32_t)((hystgen_sum_t)low + HYSTGEN_LARGEST_INPUT);
-        low = -HYSTGEN_LARGEST_INPUT;
+/* Begins a search for the sum h at the present input. */
+HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_t h) {
+    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
+    self->search.top = HYSTGEN_LARGEST_INPUT;
+    self->search.short_of = 0;
+    self->search.over = -1;
+    self->search.sum = hystgen_asked(h);
+    self->search.input = self->play[0];
+    self->search.before = self->play[0];
+}
+
+/* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
+   search is over. */
+HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t found) {
+    search->found = found;
+    if (found < search->sum) {
+        search->low = search->input;
+        search->short_of = search->sum - found;
+    } else {
+        search->top = search->input - 1;
+        search->over = found - search->sum;
     }
-    while (size > 1u) {
-        const hystgen_play_t middle = low + (hystgen_play_t)(size / 2u);
-        size = size / 2u + size % 2u;
-        if (hystgen_inverse_sum(self, middle) < sum) {
-            low = middle;
+    return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
+}
+
+/* Updates the slope to that of the secant through the last two inputs, if they are far apart. */
+HYSTGEN_APART void hystgen_inverse_turn(hystgen_inverse_t *self) {
+    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)self->search.input - self->search.before);
+    if (way >= HYSTGEN_SECANT) {
+        const hystgen_sum_t gained = hystgen_size(self->search.found - self->search.last);
+        const hystgen_sum_t slope = hystgen_quotient(gained, way);
+        self->search.slope = slope > 1 ? slope : 1;
+    }
+}
+
+/* The way from the input tried last to the solution by the slope. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_left(const hystgen_inverse_t *self) {
+    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum),
+                            self->search.slope);
+}
+
+/* Goes on to an input inside the interval, or else to its middle. */
+HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t next) {
+    search->before = search->input;
+    search->last = search->found;
+    if (next > search->low && next <= search->top) {
+        search->input = (hystgen_play_t)next;
+    } else {
+        const hystgen_sum_t size = (hystgen_sum_t)search->top - search->low + 1;
+        search->input = (hystgen_play_t)(search->low + size / 2);
+    }
+}
+
+/* The input a way on from the one tried last, at least one and not beyond all. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search,
+                                                    hystgen_sum_t way) {
+    const bool rising = search->found < search->sum;
+    const hystgen_sum_t input = search->input;
+    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
+    const hystgen_sum_t some = way > 1 ? way : 1;
+    const hystgen_sum_t inside = some > room ? room : some;
+    return rising ? input + inside : input - inside;
+}
+
+/* Goes on to the next input: by the slope of a secant, or, after too many tries, to the middle of
+   the interval, which the input tried last is an end of. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool secant) {
+    hystgen_sum_t next = self->search.input;
+    if (secant) {
+        hystgen_inverse_turn(self);
+        next = hystgen_inverse_further(&self->search, hystgen_inverse_left(self));
+    }
+    hystgen_inverse_go(&self->search, next);
+}
+
+/* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
+   if the sum is out of reach. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
+    unsigned int tries = 0;
+    hystgen_inverse_seek(self, h);
+    while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
+        hystgen_inverse_advance(self, tries < HYSTGEN_SECANTS);
+        if (tries < HYSTGEN_SECANTS) {
+            ++tries;
         }
     }
-    return hystgen_inverse_nearer(self, low, sum);
+    if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
+        return self->search.input;
+    }
+    return (hystgen_reach_t)self->search.low + (self->search.short_of > self->search.over ? 1 : 0);
 }
 #else
-/* Sum of the plays at the middle of the search interval, which becomes one of its ends. A search in
-   memory needs half as much stack as registers saved across a call. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_halve(const hystgen_inverse_t *self,
-                                                   hystgen_search_t *search) {
-    const hystgen_real_t sum = hystgen_inverse_sum(self, search->middle);
-    if (sum < search->sum) {
-        search->low = search->middle;
-    } else {
-        search->high = search->middle;
+/* Tries an input. The interval ends there from now on. */
+HYSTGEN_APART bool hystgen_inverse_found(hystgen_inverse_t *self) {
+    hystgen_search_t *search = &self->search;
+    search->left = search->sum - hystgen_inverse_sum(self, search->input);
+    if (search->left <= HYSTGEN_CLOSE && search->left >= -HYSTGEN_CLOSE) {
+        return true;
     }
-    search->middle = search->low + (search->high - search->low) / 2;
-    return sum;
+    if (search->left > 0) {
+        search->low = search->input;
+    } else {
+        search->high = search->input;
+    }
+    return false;
 }
 
-/* Input of the plays at which their sum is h, by bisection between the present input and the
-   farthest one. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self,
-                                                   hystgen_real_t h) {
-    hystgen_search_t search = {HYSTGEN_LEAST_INPUT, HYSTGEN_LARGEST_INPUT, self->play[0], h};
-    const hystgen_real_t here = hystgen_inverse_halve(self, &search);
-    if (here < search.sum || here > search.sum) {
+/* Goes on to the next input; `newton`: by the slope. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool newton) {
+    hystgen_search_t *search = &self->search;
+    if (newton) {
+        hystgen_real_t rate = HYSTGEN_RATE;
         unsigned int i;
-        for (i = 0; i < HYSTGEN_HALVES; ++i) {
-            (void)hystgen_inverse_halve(self, &search);
+        for (i = 0; i < HYSTGEN_TURNS; ++i) {
+            rate = rate + rate - search->slope * rate * rate;
         }
+        search->input = search->input + search->left * rate;
     }
-    return search.high;
+    if (!(search->input > search->low && search->input < search->high)) {
+        search->input = search->low + (search->high - search->low) / 2;
+    }
+}
+
+/* Input of the plays at which their sum is h. The last step is by the reciprocal of a slope that is
+   right in the middle, and takes the sum no farther away for any other. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
+    unsigned int i;
+    self->search.low = HYSTGEN_LEAST_INPUT;
+    self->search.high = HYSTGEN_LARGEST_INPUT;
+    self->search.input = self->play[0];
+    self->search.sum = h;
+    for (i = 0; i < HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES; ++i) {
+        if (hystgen_inverse_found(self)) {
+            return self->search.input + self->search.left * HYSTGEN_RATE;
+        }
+        hystgen_inverse_advance(self, i < HYSTGEN_NEWTON_TRIES);
+    }
+    return self->search.high;
 }
 #endif

@@ -94,12 +94,16 @@ typedef struct {
     hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
-/* A search between two inputs of the plays for the one at which their sum is `sum`. */
+/* A search between two inputs of the plays for the one at which their sum is `sum`. It lies in the
+   memory of an operator, not on its stack. */
 typedef struct {
     hystgen_real_t low;
     hystgen_real_t high;
-    hystgen_real_t middle;
+    hystgen_real_t input; /* tried last, */
     hystgen_real_t sum;
+    hystgen_real_t left;  /* what the sum lacks there, */
+    hystgen_real_t slope; /* and its change per change of the input; */
+    hystgen_real_t steep; /* that of one play */
 } hystgen_search_t;
 
 #endif

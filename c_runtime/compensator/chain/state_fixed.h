@@ -93,6 +93,22 @@ typedef struct {
     bool begun; /* the friction plays have values */
 } hystgen_friction_t;
 
+/* A search between two inputs of the plays, `low` and one above `top`, which are not tried again,
+   for the one at which their sum is `sum`. It lies in the memory of an operator, not on its stack.
+ */
+typedef struct {
+    int64_t sum;
+    int64_t short_of; /* what the sum lacks at `low`, or 0 if `low` is below all inputs, */
+    int64_t over;     /* and what it has too much above `top`, or -1 */
+    int64_t found;    /* sum at the input tried last, */
+    int64_t last;     /* and at the one before */
+    int64_t slope;    /* change of the sum per change of the input; kept from search to search */
+    int32_t input;    /* the one tried last, */
+    int32_t before;   /* and the one before */
+    int32_t low;
+    int32_t top;
+} hystgen_search_t;
+
 typedef struct {
     int64_t whole;  /* drift, in units of signals, */
     int64_t part;   /* and the fraction below, in units of the table */

@@ -33,7 +33,7 @@ from hystgen.compensator.chain.layout import Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.maps import MapErrors
 from hystgen.effects.part import Gained, Speed
-from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN
+from hystgen.effects.plays import CLOSE, DASHPOT, DILATED, RELAXING, SEEN
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
@@ -86,7 +86,7 @@ def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
     """Errors of plays that an effect moves or bends: roundings of a play as a shift of its input, roundings of the sum,
-    and the error of the sum because a search stops at a finite width.
+    and the error of the sum because a search stops near it or at a finite width.
 
     `emitted`: include the approximations of the C, which double precision does not make.
     """
@@ -96,6 +96,7 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
     low, high = static.play_range
     size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
+    summed = moving.sum_rounding(static, compiled.parts.plays, u)
     play = 4.0 * u * size
     if t.moves == RELAXING:
         slow = t.first[1:].astype(float)
@@ -109,9 +110,8 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
         play = 8.0 * u * size + stretched
         if emitted:
             play += float(t.number[SEEN]) * way  # below this the input counts as standing still
-    summed = (12.0 + len(static.pi.weights)) * u * size * steep
-    width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
-    return play, float(np.sum(p)) * summed, float(np.sum(p)) * steep * width
+    most, width = float(np.sum(p)) * steep, 3.0 * (high - low) * 2.0**-t.halves
+    return play, summed, most * u * size + max(most * width, float(t.number[CLOSE]))
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:

@@ -24,6 +24,14 @@ CELLS = 4096
 """Cells in which the slope of bent plays is computed: 1/4096 of the range is far below the width of any bump that a
 record shows; a search rejects widths below a twentieth of the range."""
 
+CLOSENESS = 0.125
+"""[bound of the sum's rounding error] A search in floating point ends this near to the sum asked for: sums of 10 plays
+are off by up to a 30th of their bound, so that nearly every search gets there."""
+
+MOST_TURNS = 12
+"""Most steps to the reciprocal of a slope: enough for slopes of which the least is a 400th of the largest; with
+flatter ones Newton's method takes shorter steps."""
+
 MOST_YIELD_BITS = 30
 """Most bits of a yield below a step of the plays' input: its rounding error is kept in 32 bits."""
 
@@ -119,6 +127,34 @@ def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, 
     return np.min(steep, axis=1), np.max(steep, axis=1)
 
 
+def slopes(static: StaticModel, effects: Sequence[Effect], seconds: float) -> tuple[float, float]:
+    """Least and largest change of the sum per change of the plays' input in a step of `seconds`."""
+    p, steep = np.abs(static.pi.weights), 1.0 + steepest_bend(static, effects)
+    least, drawn = least_slope(static, effects), np.ones(static.pi.n)
+    for mover in movers(static, effects):
+        if mover.moves(seconds) == at.DILATED:
+            least = min(least, least_dilated(static, effects, seconds))
+            drawn = drawn + mover.numbers(seconds, 1.0, 1.0).first
+    return least, float(p[0] + steep * (p[1:] @ drawn))
+
+
+def inverse_turns(least: float, most: float, unit: float) -> tuple[float, int]:
+    """Reciprocal of the middle of two slopes, and steps of `x (2 - slope x)` from there that give the reciprocal of
+    any slope in between to `unit`, its share: each squares the error."""
+    off = (most - least) / (most + least)
+    turns = math.log2(max(math.log(unit) / math.log(off), 1.0)) if off > 0.0 else 0.0
+    return 2.0 / (least + most), min(math.ceil(turns), MOST_TURNS)
+
+
+def sum_rounding(static: StaticModel, effects: Sequence[Effect], unit: float) -> float:
+    """Bound of what rounding does to the sum of moved or bent plays, wherever a search tries them; `unit`: of
+    rounding."""
+    low, high = static.play_range
+    size = 3.0 * max(abs(low), abs(high)) + static.pi.thresholds[-1]
+    bent = 1.0 + abs(steepest_bend(static, effects))
+    return (12.0 + len(static.pi.weights)) * unit * size * bent * float(np.sum(np.abs(static.pi.weights)))
+
+
 def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts: Array) -> tuple[float, float]:
     """Errors of the sum of plays whose input is shifted by up to `shifts` (n,), and the part that counts in the
     inverse, as an error of the sum that its gain `2/least_slope` multiplies."""
@@ -190,13 +226,21 @@ def build(
             curve[1:] = rows
             number[list(numbers)] = list(numbers.values())
     halves = int(np.finfo(dtype).nmant) + 4
+    alone = not movers(static, effects) and not any(effect.bends_plays() for effect in effects)
+    turns = 0
+    if not alone:
+        unit = float(np.finfo(dtype).eps) / 2
+        number[at.RATE], turns = inverse_turns(*slopes(static, effects, seconds), unit)
+        number[at.CLOSE] = CLOSENESS * sum_rounding(static, effects, unit)
     alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
     given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
     first, second, curve, number, share, inverse, yields = given
-    return at.MovingTables(moves, kind, first, second, curve, number, halves, int(scanned), share, inverse, yields)
+    return at.MovingTables(
+        moves, kind, first, second, curve, number, halves, turns, int(scanned), share, inverse, yields
+    )
 
 
 def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
@@ -253,6 +297,8 @@ def build_fixed(
     degree = bump.curves[0].degree if bump.curves else 0
     curves = bends([curve.pieces for curve in bump.curves], ends, scaled, degree)
     relaxed = _relaxed(plays, float(own.first[1])) if own.scanned else plays
+    least, weight = slopes(static, effects, seconds)[0], static.pi.weights[0]
+    near = int(0.5 * int(plays.weight[0]) * least / weight) if weight > 0.0 else 0
     stretch_end = min(farthest + bump.end, 2**32 - 1)
     bits = min(MOST_YIELD_BITS, 61 - stretch_end.bit_length())
     rows: list[tuple[int, ...]] = []
@@ -260,7 +306,7 @@ def build_fixed(
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
     return at.FixedMovingTables(
-        own.moves, own.bends, own.scanned, first, second, farthest, relaxed, curves,
+        own.moves, own.bends, own.scanned, first, second, farthest, near, relaxed, curves,
         np.array(bump.of, dtype=np.int64), bump.bits,
         np.array(rows, dtype=np.int64).reshape(-1, 7), bits, stretch_end,
         np.array(factor(float(own.number[at.SEEN])), dtype=np.int64),

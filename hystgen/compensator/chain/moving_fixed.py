@@ -3,53 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
-from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.basics.jit import Answer, jit
+from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.plays.fixed import loop_solve, nearest
+from hystgen.effects.plays import SECANT, SECANTS
+from hystgen.plays.fixed import loop_solve, nearest, quotient
 
 
-def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
-    """`search_fixed.c`, from the function that gives the sum of the plays at an input."""
+@jit(inline=True)
+def size(x: int) -> int:
+    """Distance of x from 0."""
+    return -x if x < 0 else x
+
+
+@jit
+def input_after(t: FixedChainTables, w: int, left: int, slope: int) -> int:
+    """The input that `slope` leads to from w, at least one on and none beyond all."""
+    farthest = t.moving.farthest
+    room = farthest - w if left > 0 else farthest + w
+    step = quotient(size(left), slope)
+    if step < 1:
+        step = step + 1
+    if step > room:
+        step = room
+    return w + step if left > 0 else w - step
+
+
+def search(sum_at: Callable[..., int], _: object) -> Answer:
+    """The search of `moving_search.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
-    def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
-        """Input of the plays at which their sum is h, by bisection between the present input and the farthest one: the
-        nearer of two neighbours, or the input beyond the farthest if even that is not enough."""
-        here = s.plays.play[0]
-        total = sum_at(t, s, here)
-        low = -t.moving.farthest if total > h else here
-        size = (t.moving.farthest if total < h else here) - low
-        while size > 1:
-            middle = low + size // 2
-            size -= size // 2
-            if sum_at(t, s, middle) < h:
-                low = middle
-        above = h - sum_at(t, s, low)
-        if low == t.moving.farthest:
-            return low + 1 if above > 0 else low
-        below = sum_at(t, s, low + 1) - h
-        if above < 0:
-            return low - 1
-        if below < 0:
-            return low + 2
-        return low + 1 if above > below else low
+    def searched(t: FixedChainTables, s: ChainState, h: int) -> int:
+        """Input of the plays at which their sum is h: by secants from the present input, the first one as steep as the
+        last of the sample before, within the interval of inputs that are left, then by halving it. The nearer of two
+        neighbours, or the input beyond the farthest if even that is not enough."""
+        low = -t.moving.farthest - 1
+        high = t.moving.farthest + 1
+        short = 0  # of the sum at `low`; ends beyond the farthest input are not tried, but taken if they remain
+        over = -1  # and at `high`
+        w = s.plays.play[0]
+        before = w
+        last = h
+        tries = 0
+        while True:
+            total = sum_at(t, s, w)
+            if total < h:
+                low = w
+                short = h - total
+            else:
+                high = w
+                over = total - h
+            if size(total - h) <= t.moving.near:
+                return w
+            if high - low == 1:
+                return high if short > over else low
+            way = size(w - before)
+            if tries < SECANTS and way >= SECANT:
+                slope = quotient(size(total - last), way)
+                s.bent[0] = slope if slope > 0 else slope + 1
+            before = w
+            last = total
+            if tries < SECANTS:
+                w = input_after(t, w, h - total, s.bent[0])
+            if w <= low or w >= high:  # nor is the end that was just tried
+                w = low + (high - low) // 2
+            tries += 1
 
     return searched
 
 
 @jit
-def level(t: ChainTables, total: Any) -> Any:
+def level(t: FixedChainTables, total: int) -> int:
     """A sum of the plays, which has bits below a signal's, as a signal."""
     return nearest(total, t.number.level_drop[0])
 
 
 @jit
-def asked(t: ChainTables, h: Any) -> Any:
+def asked(t: FixedChainTables, h: int) -> int:
     """The sum of the plays that a signal asks for, limited to their range."""
     inside = h
     if inside > t.number.largest_level[0]:

@@ -8,7 +8,7 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
-from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Moves
+from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Bending, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
 from hystgen.plays.slots import Reals
 
@@ -20,25 +20,50 @@ class Kind(NamedTuple):
     asked: Function  # of chain tables and a signal: the sum of the plays asked for
     solve: Function  # of plays, state and a sum: as engine loop
     moves: Moves  # plays that an effect moves
-    bent: Function  # of the `moving` tables, those of plays, i and z: the contribution of play i at z
-    search: Function  # of a function from input to sum: the function that finds the input
+    bends: Bending  # plays that an effect bends
+    search: Function  # of functions from input to sum, and to sum and slope: the function that finds the input
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
     number."""
-    level, asked, solve, moves, bent, search = kind
-    moved, move, put, rests, relaxing_follow, relaxing_input = moves
+    level, asked, solve, moves, (bent, steep), search = kind
+    moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
-    def moved_sum(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The sum of the plays after their input has gone to w."""
+    def resting(r: Reals, s: State, i: int, w: Any) -> Any:
+        """Play i at rest with its input at w."""
+        low = w - r[i]
+        high = w + r[i]
+        upper = high if s.play[i] > high else s.play[i]
+        return low if upper < low else upper
+
+    @jit
+    def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
+        """The sum of the plays with their input at w, moved there or at rest."""
+        m, plays, play = t.moving, t.plays, s.plays.play
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
-            z = moved(m, r, i, s, lost, w)
-            total = total + p[i] * (values[i] if z == s.play[i] else bent(m, plays, i, z))
+            z = moved(m, r, i, s.plays, s.lost, w) if s.own.moving[0] else resting(r, s.plays, i, w)
+            total = total + p[i] * (s.bent[i] if z == play[i] else bent(m, plays, i, z))
         return total
+
+    @jit
+    def tried_at(t: ChainTables, s: ChainState, w: Any) -> tuple[Any, Any]:
+        """The same, and its change per change of w, as if the plays were moved."""
+        m, plays, play = t.moving, t.plays, s.plays.play
+        r, p = plays.threshold, plays.weight
+        total = p[0] * w
+        slope = p[0]
+        for i in range(1, len(r)):
+            z, drawn = tried(m, r, i, s.plays, s.lost, w, p[i])
+            if not s.own.moving[0]:
+                z = resting(r, s.plays, i, w)
+            value = s.bent[i] if z == play[i] else bent(m, plays, i, z)
+            total = total + p[i] * value
+            slope = slope + steep(m, i, z, value, drawn)
+        return total, slope
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
@@ -66,28 +91,12 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
                 values[i] = bent(m, plays, i, rest)
 
     @jit
-    def resting(r: Reals, s: State, i: int, w: Any) -> Any:
-        """Play i at rest with its input at w."""
-        low = w - r[i]
-        high = w + r[i]
-        upper = high if s.play[i] > high else s.play[i]
-        return low if upper < low else upper
-
-    @jit
-    def resting_sum(m: Any, plays: Any, s: State, values: Reals, w: Any) -> Any:
-        """The sum of the plays if they came to rest with their input at w."""
-        r, p = plays.threshold, plays.weight
-        total = p[0] * w
-        for i in range(1, len(r)):
-            z = resting(r, s, i, w)
-            total = total + p[i] * (values[i] if z == s.play[i] else bent(m, plays, i, z))
-        return total
-
-    @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum."""
+        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is the slope that a
+        search in fixed point begins with."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
+        values[0] = p[0]
         for i in range(1, len(r)):
             put(m, i, s, lost, resting(r, s, i, w))
             values[i] = bent(m, plays, i, s.play[i])
@@ -95,14 +104,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         s.play[0] = w
         return total
 
-    @jit
-    def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
-        """The sum of the plays with their input at w."""
-        if s.own.moving[0]:
-            return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
-        return resting_sum(t.moving, t.plays, s.plays, s.bent, w)
-
-    searched = search(sum_at)
+    searched = search(sum_at, tried_at)
 
     @jit(inline=True)
     def start(t: ChainTables, s: ChainState, zero: int) -> None:

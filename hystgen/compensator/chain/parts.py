@@ -19,8 +19,8 @@ from hystgen.effects import CATALOGUE, shapes
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.maps import Map, MapPart
-from hystgen.effects.part import ChainPart, Function
-from hystgen.effects.plays import Bent, Mover, Moves, PlaysPart
+from hystgen.effects.part import ChainPart
+from hystgen.effects.plays import Bending, Bent, Mover, Moves, PlaysPart
 from hystgen.plays.slots import Counts
 
 
@@ -37,7 +37,7 @@ _CATALOGUE: list[ChainPart] = [part for module in _MODULES for part in getattr(m
 
 MOVES: PlaysPart[Mover, Moves]
 (MOVES,) = (module.MOVES for module in _MODULES if hasattr(module, "MOVES"))
-BENDS: PlaysPart[Bent, Function]
+BENDS: PlaysPart[Bent, Bending]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
 """The effects that move plays, and that bend them."""
 

@@ -13,7 +13,7 @@ from hystgen.effects import plays as at
 from hystgen.effects.base import Array
 from hystgen.effects.noncongruent.model import LoopCentre, PlayFunctions
 from hystgen.effects.part import late
-from hystgen.effects.plays import Bent, MovingTables, PlaysPart
+from hystgen.effects.plays import Bending, Bent, MovingTables, PlaysPart
 from hystgen.front.tanh.kernels import tanh
 from hystgen.front.tanh.model import TanhEnvelope
 
@@ -47,6 +47,7 @@ def _centred(effect: LoopCentre) -> Bent:
     begin = float(envelope.forward(0.0))
     numbers = {
         at.MIDDLE: effect.centre, at.INVERSE_WIDTH: inverse, at.BUMP: high,
+        at.INVERSE_BUMP: 1.0 / high if high else 0.0,
         at.TANH_CENTRE: math.tanh(effect.centre / effect.width),
     }
     return Bent(
@@ -72,5 +73,24 @@ def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
     return z
 
 
-BENDS = PlaysPart(of, bent, late("noncongruent"))
+@jit
+def steep(t: MovingTables, i: int, z: Any, value: Any, base: Any) -> Any:
+    """Change of play i's contribution at z, `value`, per change of the plays' input, from that of the play itself."""
+    if t.bends == at.POLYNOMIAL:
+        x = z * t.number[at.INVERSE_SCALE]
+        total = z - z
+        slope = total
+        for k in range(t.curve.shape[1] - 1, -1, -1):
+            total = total + t.curve[i, k]
+            slope = slope * x + total
+            total = total * x
+        return base + base * (slope * x + total)
+    if t.bends == at.CENTRE:
+        bump = (value - z) * t.number[at.INVERSE_BUMP] - t.number[at.TANH_CENTRE]
+        amplitude = t.number[at.BUMP] * t.number[at.INVERSE_WIDTH]
+        return base + base * (amplitude - amplitude * bump * bump)
+    return base
+
+
+BENDS = PlaysPart(of, Bending(bent, steep), late("noncongruent"))
 """Bent plays as a part of the chain."""

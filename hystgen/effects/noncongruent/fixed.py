@@ -6,12 +6,12 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.effects.bend import bend
-from hystgen.effects.plays import STRAIGHT, FixedMovingTables
+from hystgen.effects.plays import STRAIGHT, Bending, FixedMovingTables
 from hystgen.plays.fixed import nearest
 
 
 @jit
-def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG001  as in floating point
+def bent(t: FixedMovingTables, plays: Any, i: int, z: int) -> int:  # noqa: ARG001  as in floating point
     """Contribution of play i at z."""
     if t.bends == STRAIGHT:
         return z
@@ -19,4 +19,4 @@ def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG0
     return z + nearest(value, t.bump_bits)
 
 
-ARITHMETIC = bent
+ARITHMETIC = Bending(bent)

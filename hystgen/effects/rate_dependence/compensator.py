@@ -326,8 +326,8 @@ def movement(
 
 
 @jit
-def yields(t: MovingTables, x: Any) -> Any:
-    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0."""
+def piece(t: MovingTables, x: Any) -> int:
+    """The piece of the yield at stretch x >= 0."""
     low = 0
     high = len(t.yields)
     while high - low > 1:
@@ -336,8 +336,25 @@ def yields(t: MovingTables, x: Any) -> Any:
             high = middle
         else:
             low = middle
-    on = x - t.yields[low, BEGIN]
-    return ((t.yields[low, C3] * on + t.yields[low, C2]) * on + t.yields[low, C1]) * on + t.yields[low, C0]
+    return low
+
+
+@jit
+def yields(t: MovingTables, x: Any) -> Any:
+    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0."""
+    k = piece(t, x)
+    on = x - t.yields[k, BEGIN]
+    return ((t.yields[k, C3] * on + t.yields[k, C2]) * on + t.yields[k, C1]) * on + t.yields[k, C0]
+
+
+@jit
+def yielding(t: MovingTables, x: Any, weight: Any) -> Any:
+    """Change of the yield at stretch x > 0 per change of the plays' input, times a weight."""
+    k = piece(t, x)
+    on = x - t.yields[k, BEGIN]
+    bend = t.yields[k, C3] * on
+    slope = (bend + bend + bend + t.yields[k, C2] + t.yields[k, C2]) * on + t.yields[k, C1]
+    return weight * t.number[SEEN] * slope
 
 
 @jit(inline=True)
@@ -393,9 +410,38 @@ def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
     return w
 
 
+moved, move, put, rest = movement(share_of, yields, seen, unchanged, unchanged)
+
+
+@jit
+def tried(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, weight: Any) -> tuple[Any, Any]:
+    """Play i after the input of the plays has gone to w, and its change per change of w, times a weight."""
+    q = s.play[i]
+    if t.moves == DASHPOT:
+        on = stretch(s.play[0] + seen(t, w - s.play[0]) - q, r[i])
+        steep = zero(on) if on == zero(on) else yielding(t, on if on > zero(on) else -on, weight)
+        return moved(t, r, i, s, lost, w), steep
+    if t.moves == RELAXING:
+        on = stretch(w - q, r[i])
+        return q + share_of(t.first, i, on), zero(on) if on == zero(on) else share_of(t.first, i, weight)
+    way = w - s.play[0]
+    threshold = r[i]
+    wider = zero(weight)
+    if t.moves == DILATED:
+        threshold = r[i] + share_of(t.first, i, way if way > zero(way) else -way)
+        wider = share_of(t.first, i, weight)
+    low = w - threshold
+    high = w + threshold
+    if q > low and q < high:
+        return q, zero(weight)
+    if q <= low:
+        return low, weight - wider if way >= zero(way) else weight + wider
+    return high, weight + wider if way > zero(way) else weight - wider
+
+
 MOVES = PlaysPart(
     Movement,
-    Moves(*movement(share_of, yields, seen, unchanged, unchanged), relaxing_follow, relaxing_input),
+    Moves(moved, move, put, rest, relaxing_follow, relaxing_input, tried),
     late("rate_dependence"),
 )
 """Plays that depend on the rate as a part of the chain."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.effects.plays import FixedMovingTables, Moves
 from hystgen.effects.rate_dependence.compensator import LONGEST, movement, stretch
 from hystgen.front.curve import HALF
-from hystgen.plays.fixed import loop_solve, nearest
+from hystgen.plays.fixed import FixedPlayTables, loop_solve, nearest
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals
 
@@ -50,7 +49,7 @@ def whole_yields(
 
 
 @jit
-def yields(t: FixedMovingTables, x: Any) -> Any:
+def yields(t: FixedMovingTables, x: int) -> int:
     """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0, with bits below a step of the input."""
     inside = t.stretch if x > t.stretch else x
     low = 0
@@ -71,31 +70,31 @@ def yields(t: FixedMovingTables, x: Any) -> Any:
 
 
 @jit
-def seen(t: FixedMovingTables, way: Any) -> Any:
+def seen(t: FixedMovingTables, way: int) -> int:
     """The part of `way` at which the input counts as standing still."""
     return times(way, t.seen[0], t.seen[1])
 
 
 @jit
-def moved_by(t: FixedMovingTables, gained: Any) -> Any:
+def moved_by(t: FixedMovingTables, gained: int) -> int:
     """The move of a play for its yield."""
     return nearest(gained, t.yield_bits)
 
 
 @jit
-def yield_of(t: FixedMovingTables, moved: Any) -> Any:
+def yield_of(t: FixedMovingTables, moved: int) -> int:
     """The yield for a play's move."""
     return moved << t.yield_bits
 
 
 @jit
-def share_of(factors: Reals, i: int, x: Any) -> Any:
+def share_of(factors: Reals, i: int, x: int) -> int:
     """x times the factor of play i."""
     return times(x, factors[i, 0], factors[i, 1])
 
 
 @jit
-def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
+def relaxing_follow(t: FixedMovingTables, plays: FixedPlayTables, s: State, w: int) -> int:
     """Move viscous plays with one time constant with their input w. Returns their sum. In spite of rounding,
     neighbouring plays rest at most as far apart as their thresholds."""
     r, p = plays.threshold, plays.weight
@@ -116,7 +115,7 @@ def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
 
 
 @jit
-def relaxing_input(t: FixedMovingTables, plays: Any, s: State, h: Any) -> Any:  # noqa: ARG001  as in floating point
+def relaxing_input(t: FixedMovingTables, plays: FixedPlayTables, s: State, h: int) -> int:  # noqa: ARG001  as in floating point
     """Input of viscous plays at which their sum is h. With the input where play 1 rests, none is stretched; beyond that
     they are solved for like plain plays, with smaller slopes."""
     s.play[0] = s.play[1]

@@ -19,14 +19,15 @@ static inline int64_t hystgen_yield_of(int64_t moved) {
 
 /* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with
    HYSTGEN_YIELD_BITS bits below a step of the plays' input: a piecewise cubic as in hystgen_curve,
-   each piece with the bits that its values leave out; never more than x. */
-static int64_t hystgen_yield(int64_t x) {
+   each piece with the bits that its values leave out; never more than x. Leaves `slope` alone. */
+static int64_t hystgen_yield(int64_t x, const int64_t *slope) {
     const uint32_t whole = (uint32_t)x;
     const uint32_t inside = whole > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : whole;
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
     int64_t y = 0;
     unsigned int k;
+    (void)slope;
     while (high - low > 1u) {
         const unsigned int middle = (low + high) / 2;
         const bool before = inside < hystgen_yields[middle].begin;
@@ -48,8 +49,8 @@ static inline int64_t hystgen_standing_way(int64_t way) {
 }
 #else
 /* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step: a table, cubic
-   between its knots. */
-static hystgen_real_t hystgen_yield(hystgen_real_t x) {
+   between its knots. Sets `slope` to its change with x. */
+static hystgen_real_t hystgen_yield(hystgen_real_t x, hystgen_real_t *slope) {
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
     while (high - low > 1u) {
@@ -60,7 +61,9 @@ static hystgen_real_t hystgen_yield(hystgen_real_t x) {
     }
     const hystgen_real_t *c = hystgen_yields[low];
     const hystgen_real_t on = x - c[0];
-    return ((c[4] * on + c[3]) * on + c[2]) * on + c[1];
+    const hystgen_real_t bend = c[4] * on;
+    *slope = (bend + bend + bend + c[3] + c[3]) * on + c[2];
+    return ((bend + c[3]) * on + c[2]) * on + c[1];
 }
 
 /* The part of a step `way` after which the input is taken as standing still. */

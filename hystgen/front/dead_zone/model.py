@@ -6,6 +6,7 @@ import bisect
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.arguments import finite_numbers
-from hystgen.basics.frozen import dataclass
 from hystgen.basics.problems import NotInvertibleError, counted
 
 Array = NDArray[np.float64]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.arguments import finite_numbers
-from hystgen.basics.frozen import dataclass
 from hystgen.front.tanh import kernels
 
 Array = NDArray[np.float64]

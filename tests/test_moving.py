@@ -1,0 +1,202 @@
+"""The input of plays that an effect moves or bends, as a search finds it: against exact sums, and in how many tries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from modelfiles import head
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import jit
+from hystgen.compensator import reference
+from hystgen.compensator.chain import moving, moving_fixed, moving_float
+from hystgen.effects.plays import CLOSE, LARGEST_INPUT, LEAST_INPUT, NEWTON_TRIES, SECANTS
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import fixed, slots
+
+FARTHEST = 2**31 - 1
+
+
+def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
+    """A sum over whole inputs that rises steadily in each of some pieces, and jumps between them."""
+    at = sorted(rng.integers(-FARTHEST, FARTHEST, kinks).tolist())
+    slopes = [round(1000.0 * x) for x in np.exp(rng.uniform(0.0, 7.0, kinks + 1)).tolist()]
+    jumps = [round(x) for x in (rng.random(kinks) < 0.2) * rng.uniform(0, 2**40, kinks)]
+
+    def total(w: int) -> int:
+        found = slopes[0] * w
+        for knot, jump, before, after in zip(at, jumps, slopes, slopes[1:], strict=False):
+            if w > knot:
+                found += jump + (after - before) * (w - knot)
+        return found
+
+    return total
+
+
+def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: int = 0) -> tuple[int, int]:
+    """The answer of a search in fixed point, and its tries."""
+    tries = [0]
+
+    def sum_at(_: Any, state: Any, w: int) -> int:
+        tries[0] += state is s
+        return total(w)
+
+    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near))
+    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[slope])
+    with jit.plain():
+        answer = moving_fixed.search(sum_at, None)(t, s, h)
+    return int(answer), tries[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_search_in_fixed_point_ends_at_the_nearer_neighbour(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    most = 0
+    for _ in range(150):
+        total = rising(rng, int(rng.integers(0, 12)))
+        inside = total(int(rng.integers(-FARTHEST, FARTHEST))) + int(rng.integers(-(2**20), 2**20))
+        h = inside if rng.random() < 0.9 else total(FARTHEST) + int(rng.integers(1, 2**40))
+        answer, tries = found_in(total, int(rng.integers(-FARTHEST, FARTHEST)), int(rng.integers(1, 10**6)), h)
+        low, high = -FARTHEST - 1, FARTHEST + 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if total(middle) < h else (low, middle)
+        if high > FARTHEST:
+            assert answer == high
+        elif low < -FARTHEST:
+            assert answer == (high if total(high) == h else low)
+        else:
+            assert answer in (low, high)
+            assert abs(total(answer) - h) == min(h - total(low), total(high) - h)
+        most = max(most, tries)
+    assert most <= 1 + SECANTS + 32
+
+
+def test_slopes_of_no_use_cost_a_search_all_its_tries() -> None:
+    """A sum that jumps from flat to flat: secants creep, and halving ends at the jump."""
+    counts = []
+    for jump in (12345, -(2**30), 2**31 - 5):
+        answer, tries = found_in(lambda w, jump=jump: w + 2**50 * (w > jump), -(2**31) + 1, 2**40, 2**49)
+        assert answer in (jump, jump + 1)
+        counts.append(tries)
+    assert 34 <= max(counts) <= 1 + SECANTS + 32
+
+
+def test_a_sum_that_is_near_ends_a_search_in_fixed_point() -> None:
+    """Half the least slope is nearer than either neighbour."""
+    answer, tries = found_in(lambda w: 1000 * w, 0, 1000, 1000 * 77 + 499, 500)
+    assert (answer, tries) == (77, 2)
+    answer, tries = found_in(lambda w: 1000 * w, 0, 1000, 1000 * 77 + 499, 498)
+    assert (answer, tries) == (77, 3)
+
+
+def test_quotients_are_exact_to_a_part_in_2_28() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(3000):
+        x, y = (int(2.0 ** rng.uniform(0.0, 61.9)) for _ in range(2))
+        exact = Fraction(x, y)
+        found = int(fixed.quotient.py_func(x, y))
+        if exact < 2**60:
+            assert abs(found - exact) <= Fraction(1, 2) + Fraction(1, 2**20) + exact / 2**28
+        else:
+            assert found >= 2**59
+    assert fixed.quotient.py_func(0, 5) == 0
+
+
+# ---------------------------------------------------------------- thresholds by rate, in floating point
+
+BETAS = (3.0e-4, 0.0, 1.0e-4, 4.0e-4, 2.0e-4)
+"""In no order, so that plays start in no order either."""
+
+
+def dilated() -> Model:
+    pi = "\n  pi: {thresholds: [0, 1, 1.5, 2.5, 4, 5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
+    effect = f"  effects: [{{name: rate_dependence, betas: [{', '.join(map(str, BETAS))}]}}]\n"
+    return Model(parse_parameters(f"{head('m')}{pi}{effect}sample_time: 1.0e-3\n", "m.yaml"))
+
+
+class Exact:
+    """Plays whose thresholds grow with the move, in fractions: the state of a compensator's, and its constants."""
+
+    def __init__(self, t: Any, s: Any) -> None:
+        self.r, self.p, self.wider, self.play = (
+            [Fraction(float(x)) for x in row]
+            for row in (t.plays.threshold, t.plays.weight, t.moving.first, s.plays.play)
+        )
+
+    def total(self, w: Fraction) -> Fraction:
+        found = self.p[0] * w
+        for r, p, wider, q in list(zip(self.r, self.p, self.wider, self.play, strict=True))[1:]:
+            wide = r + wider * abs(w - self.play[0])
+            found += p * max(w - wide, min(q, w + wide))
+        return found
+
+    def kinks(self) -> list[Fraction]:
+        """Inputs at which a play begins or ends to be drawn along, either way."""
+        x, found = self.play[0], [self.play[0]]
+        for r, wider, q in list(zip(self.r, self.wider, self.play, strict=True))[1:]:
+            for side in (1, -1):  # which end of the play's band is at q
+                for way in (1, -1):  # of the input
+                    slope = way - side * wider  # of that end over the move's size
+                    move = (q - x + side * r) / slope if slope else Fraction(-1)
+                    if move > 0:
+                        found.append(x + way * move)
+        return sorted(found)
+
+    def solved(self, h: Fraction, ends: tuple[Fraction, Fraction]) -> Fraction:
+        """The input, from the kinks around it."""
+        at = [ends[0], *(k for k in self.kinks() if ends[0] < k < ends[1]), ends[1]]
+        totals = [self.total(k) for k in at]
+        assert all(a < b for a, b in pairwise(totals))
+        k = next(k for k in range(1, len(at)) if totals[k] >= h)
+        return at[k - 1] + (h - totals[k - 1]) * (at[k] - at[k - 1]) / (totals[k] - totals[k - 1])
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
+    arithmetic: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sums that are reached where a play starts, and one unit in the last place to either side, from wherever drives
+    have left the plays. Newton's method gets there without halving."""
+    counts = [0]
+    reciprocal = moving_float.inverse.py_func
+
+    def counted(t: Any, slope: Any) -> Any:
+        counts[-1] += 1
+        return reciprocal(t, slope)
+
+    monkeypatch.setattr(moving_float, "inverse", counted)
+    monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))
+    real, one = ARITHMETICS[arithmetic].number.type, dilated()
+    t = one.tables(arithmetic, "loop")
+    code, s = reference.operations(t, True), reference.new_state(t, True)
+    number, rng = t.moving.number, np.random.default_rng(5)
+    ends = Fraction(float(number[LEAST_INPUT])), Fraction(float(number[LARGEST_INPUT]))
+    unit = float(np.finfo(real).eps) / 2
+    least = moving.slopes(one.cascade, one.parameters.model.effects, 1.0e-3)[0]
+    rounding = moving.sum_rounding(one.cascade, one.parameters.model.effects, unit)
+    with jit.plain():
+        code.init(t, s)
+        call, status = np.array([slots.OP_STEP], np.uint8), np.zeros(1, np.uint8)
+        for k in range(40):
+            u = np.array([rng.uniform(-8.0, 8.0) * rng.choice([1.0, 0.1])], real)
+            code.run(t, s, call, u, np.zeros(1, real), status)
+            if k < 2:
+                continue  # at rest, or about to be moved for the first time
+            exact = Exact(t, s)
+            for kink in exact.kinks():
+                at = real(float(exact.total(kink)))
+                for h in (np.nextafter(at, real(-np.inf)), at, np.nextafter(at, real(np.inf))):
+                    counts.append(1)
+                    answer = moving_float.PLAYS[3](t, s, h)
+                    error = abs(Fraction(float(answer)) - exact.solved(Fraction(float(h)), ends))
+                    assert error <= Fraction((rounding + float(number[CLOSE])) / least)
+                    assert error <= Fraction(16 * unit * 12), (k, float(error))
+    assert max(counts[1:]) <= NEWTON_TRIES
