@@ -847,7 +847,7 @@ def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
     with pytest.raises(FormatError, match=what):
         tables.build(one.chain, "float32", T, one.parameters.emit.compensation)
     modes = [Resonance(name="resonance", frequency=frequency, damping=0.02) for frequency in (0.9, 1.1)]
-    with pytest.raises(FormatError, match=r"the modes take 1\d\d\d samples one behind the other, and the C keeps 1000"):
+    with pytest.raises(FormatError, match=r"the modes take 1\d\d\d samples in series, and the C keeps 1000"):
         preview.taps(0.0, modes, T, by=by)
     assert len(preview.taps(0.0, modes[1:], T, by=by).weights) <= 1000
 
@@ -956,7 +956,7 @@ def memory_is_that_of_the_compiler(one: Model, arithmetic: str, engine: str, tmp
 
 
 REFUSED = {
-    "name: drift, rate: 0.1": "a clock that runs alone",
+    "name: drift, rate: 0.1": "a clock that runs by itself",
     "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001": "own heat",
     "name: noncongruent, coefficients: [[9], [9], [9], [9], [9], [9]]": "there is no inverse",
 }

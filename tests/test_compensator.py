@@ -205,7 +205,7 @@ def test_a_mode_arrives_as_the_mean_of_three_samples() -> None:
     static = both([], (), t, smooth(t))[0]
     rung = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [mode]).simulate([Run(t, static, {})])[0]
     assert float(np.std(y - smooth(t))) < 0.02 * float(np.std(rung - smooth(t)))
-    with pytest.raises(EffectsError, match="even times"):
+    with pytest.raises(EffectsError, match="evenly spaced"):
         both([mode], (), times(uneven=True), smooth(times(uneven=True)))
 
 
@@ -272,7 +272,7 @@ def test_a_step_that_is_shaped_or_notched_leaves_no_ringing(by: str, model: Call
 def test_options_that_count_samples_need_them_at_even_times(model: Callable[[str], hystgen.Model]) -> None:
     lag = "    - {name: lag, time_constant: 0.01}\nemit: {compensation: {%s}}\n"
     t = times(uneven=True)
-    with pytest.raises(EffectsError, match=r"emit\.compensation needs samples at even times; resample"):
+    with pytest.raises(EffectsError, match=r"emit\.compensation needs evenly spaced samples; resample"):
         model(lag % "corner: 4").inverse().simulate(smooth(t), t=t)
     with pytest.raises(EffectsError, match=r"leave a noise gain of 1, more than emit\.compensation\.noise_gain = 0\.5"):
         model(lag % "noise_gain: 0.5").inverse().simulate(smooth(times()), t=times())
@@ -308,7 +308,7 @@ def test_thresholds_that_grow_too_fast_are_stood_in_for() -> None:
 
 def test_what_has_no_inverse_says_why(model: Callable[[str], hystgen.Model]) -> None:
     for effects, kind, said in (
-        ("    - {name: drift, rate: 1}\n", EffectsError, r"cannot take in drift \(a clock"),
+        ("    - {name: drift, rate: 1}\n", EffectsError, r"cannot include drift \(a clock"),
         (
             "    - {name: thermal, source: self_heating, time_constant: 10, heating: 1.0e-5}\n",
             EffectsError, "own heat",

@@ -289,7 +289,7 @@ def test_no_density_at_all() -> None:
 
 
 def test_thresholds_that_coincide() -> None:
-    with pytest.raises(DensityError, match=r"two of 4 thresholds coincide at r = .*; take fewer, or a density that is spread wider"):
+    with pytest.raises(DensityError, match=r"two of 4 thresholds coincide at r = .*; take fewer, or a wider density"):
         from_table([0, 5e-324], [1, 1]).discretise(1.0, 4)
 
 

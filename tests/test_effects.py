@@ -991,7 +991,7 @@ def test_records_keep_session_time_and_others_follow_their_rest() -> None:
     before = after.run.t < -0.05
     assert np.all(after.run.v[(after.run.t > -3.1) & before] == -1.0)
     for nothing in ([], [Run(t[:0], t[:0])]):
-        with pytest.raises(ValueError, match="samples"):
+        with pytest.raises(ValueError, match="no record may be empty"):
             join(nothing)
 
 
@@ -1146,7 +1146,7 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
     (OWN.replace("user:own", "own"), r'own.py: class Own needs a name of its own; write name: Literal["user:my_'),
     (OWN.replace("Literal[\"user:own\"]", "str"), r"own.py: class Own needs a name of its own"),
     (OWN.replace("    place: ClassVar[Place] = Place.ADDED\n", ""), r"own.py: class Own needs a place; write place: "),
-    (OWN.replace("def added", "def addd"), r"own.py: class Own has place added, for which it has to define added"),
+    (OWN.replace("def added", "def addd"), r"own.py: class Own has place added, so it has to define added"),
     (OWN.replace("height: float", "height: nothing"), r"own.py:7: NameError: name 'nothing' is not defined"),
 ])  # fmt: skip
 def test_a_wrong_file_gives_one_message(tmp_path: Path, text: str | None, said: str) -> None:
@@ -1219,7 +1219,7 @@ def test_an_edit_that_keeps_second_and_size_is_seen(tmp_path: Path, monkeypatch:
 
 def test_an_output_that_is_not_finite_is_refused() -> None:
     t, v = drive()
-    with pytest.raises(EffectsError, match="the output is not finite; what do the parameters of sensor_nonlinearity"):
+    with pytest.raises(EffectsError, match="the output is not finite; check the parameters of sensor_nonlinearity"):
         Chain(CASCADE, [make("sensor_nonlinearity", coefficients=(1e30,) * 16, scale=1e-30)]).simulate([Run(t, v)])
 
 
@@ -1370,7 +1370,7 @@ def test_show_says_how_the_inverse_reads_the_reference(
     assert f"compensation: {usual} of the present one: no ringing, no delay" in out.splitlines()[-1]
     for option, said, last in (
         ("resonance: notch", "a notch, see below", "    Resonance: after a step of the reference the stage does not"),
-        ("resonance: none", "none, as emit.compensation.resonance says", "        compensation: none"),
+        ("resonance: none", "none, as emit.compensation.resonance sets", "        compensation: none"),
         ("noise_gain: 8", usual, "    Noise: references are averaged twice over"),
         ("quiet: true, noise_gain: 1000", usual, "    Quiet: after 34 equal references"),
     ):

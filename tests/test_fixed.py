@@ -335,9 +335,9 @@ def test_a_refused_format_says_where(tmp_path: Path, change: tuple[str, str], sa
 
 def test_simulating_takes_codes() -> None:
     model = Model(parse_parameters(FILES["plain"], "plain.yaml"))
-    with pytest.raises(ValueError, match="whole numbers from -32768 to 32767"):
+    with pytest.raises(ValueError, match="integers from -32768 to 32767"):
         model.simulate(np.array([0.5]), arithmetic="q15")
-    with pytest.raises(ValueError, match="whole numbers"):
+    with pytest.raises(ValueError, match="codes, integers"):
         model.simulate(np.array([40000]), arithmetic="q15")
 
 
@@ -356,7 +356,7 @@ def test_simulating_on_the_command_line_speaks_of_codes(tmp_path: Path) -> None:
     for extra in ([str(tmp_path / "volts.csv")], [str(tmp_path / "codes.csv"), "--history", "0.5"]):
         done = CliRunner().invoke(main, [*words, *extra])
         assert done.exit_code == 2
-        assert "fixed point takes codes, whole numbers from -32768 to 32767" in done.stderr
+        assert "fixed point takes codes, integers from -32768 to 32767" in done.stderr
 
 
 def test_no_entry_of_a_curve_passes_its_type() -> None:
@@ -401,5 +401,5 @@ def test_more_breaks_than_fixed_point_takes_are_refused_at_once() -> None:
     ((path, message),) = caught.value.problems
     assert path == ("model", "memoryless")
     assert message == (
-        "bends at 4094 places inside input_range, and fixed point takes 2000; thin out the thresholds or use float32"
+        "has 4094 kinks inside input_range, and fixed point takes at most 2000; thin out the thresholds or use float32"
     )

@@ -581,7 +581,7 @@ def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
 
 def test_the_reference_takes_codes_and_degrees() -> None:
     one = Model(parse_parameters(CHAINS["warm"], "warm.yaml"))
-    with pytest.raises(ValueError, match="fixed point takes codes, whole numbers from -32768 to 32767"):
+    with pytest.raises(ValueError, match="fixed point takes codes, integers from -32768 to 32767"):
         one.simulate([0.5], "q15", extra={"temperature": [20.0]})
     numbers, codes = compiled(one, "q15")
     y = one.inverse().simulate([8000, 8000], "q15", extra={"temperature": [20.0, 60.0]}) * float(codes.drive_lsb)

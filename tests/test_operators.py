@@ -177,9 +177,9 @@ def test_elements_take_the_least_energy(load: list[float], modulus: float, r: fl
 
 def test_elements_that_cannot_be() -> None:
     for element in (elastoplastic.parallel, elastoplastic.series):
-        with pytest.raises(ValueError, match="a modulus is a positive number"):
+        with pytest.raises(ValueError, match="a modulus must be positive"):
             element([1.0], 0.0, 1.0)
-        with pytest.raises(ValueError, match="a yield stress is a number that is not negative"):
+        with pytest.raises(ValueError, match="a yield stress must not be negative"):
             element([1.0], 1.0, -1.0)
         with pytest.raises(ValueError, match="all samples of an input have to be finite"):
             element([0.0, float("nan")], 1.0, 1.0)
@@ -189,7 +189,7 @@ def test_elements_that_cannot_be() -> None:
 
 @pytest.mark.parametrize("thresholds", [[0.0, -1.0], 1.0, [[1.0]]])
 def test_thresholds_that_plays_cannot_have(thresholds: object) -> None:
-    with pytest.raises(ValueError, match="play thresholds are a list of numbers that are not negative"):
+    with pytest.raises(ValueError, match="play thresholds must be a list of nonnegative numbers"):
         operators.plays([0.0, 1.0], thresholds)  # type: ignore[arg-type]
 
 

@@ -393,14 +393,14 @@ def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
 
 
 SOLVED, NUMBERS = "    return s[0] + product", "return [rate, 1.0 / rate]"
-PRECISE = "is of another precision than the C's; put it in the table"
+PRECISE = "does not have the precision of the C; put it in the table"
 BAD_PYTHON = {
     "number": (SOLVED, "    return 1.0 + s[0] + product", f":24: the number 1.0 in solve {PRECISE}"),
     "named number": (SOLVED, "    return RATE + product", f":24: the number RATE in solve {PRECISE}"),
     "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":24: solve has np.abs(s[0]); write it"),
     "times": (SOLVED, "    return s[0] * s[0] + product", ":24: solve has s[0] * s[0]; write it with +, -, product"),
-    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a number of the"),
-    "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
+    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a table entry first"),
+    "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, so it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
     "word": ('("reached",)', '("while",)', "has 'while' among the names of its table and state"),
@@ -409,9 +409,9 @@ BAD_PYTHON = {
     "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
     "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
     "not linear": ("    return s[0]\n\n\nclass", "    return s[0] + t[RATE]\n\n\nclass", "its block is not linear"),
-    "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
-    "other at rest": ("\n    return y", "\n    return product(t[RATE], y)", "one undoes the other"),
-    "gain": ("    return s[0]\n\n\nclass", "    return s[0] + s[0]\n\n\nclass", "does not stay where rest leaves it"),
+    "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay at rest"),
+    "other at rest": ("\n    return y", "\n    return product(t[RATE], y)", "they must be inverse"),
+    "gain": ("    return s[0]\n\n\nclass", "    return s[0] + s[0]\n\n\nclass", "does not stay at rest"),
     "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
 }  # fmt: skip
 
@@ -433,12 +433,12 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
 
 SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
 ONLY_FLOAT = {
-    "another input": ([SOFT], "its solve does not give the input for which absorb returns the output asked for"),
+    "another input": ([SOFT], "its solve does not return the input for which absorb returns the requested output"),
     "memory": ([("    return s[0] + product", "    s[1] = y\n    return s[0] + product"),
                 ('("reached",)', '("reached", "asked")'),
                 ("    s[0] = x\n    return x", "    s[0] = x\n    s[1] = x\n    return x"),
                 ("    return s[0]\n\n\nclass", "    s[1] = s[0]\n    return s[0]\n\n\nclass")],
-               "its solve changes the memory, which fixed point bounds by what absorb and rest do"),
+               "its solve changes the memory, but fixed point bounds only what absorb and rest do"),
 }  # fmt: skip
 
 

@@ -46,8 +46,8 @@ def test_the_curve_rises_everywhere_and_is_straight_beyond_its_ends() -> None:
 @pytest.mark.parametrize(
     ("knots", "values", "message"),
     [
-        ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "has to be above 1, the entry before it"),
-        ((0.0, 1.0, 2.0), (0.0, 3.0, 2.0), "has to be above 3, the entry before it"),
+        ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "has to be above 1, the previous entry"),
+        ((0.0, 1.0, 2.0), (0.0, 3.0, 2.0), "has to be above 3, the previous entry"),
         ((0.0, 1.0, 2.0), (0.0, 3.0), "has 2 values for 3 in knots"),
     ],
 )

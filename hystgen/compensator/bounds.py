@@ -1,26 +1,25 @@
 """Rounding-error bounds of a compiled operator against the exact model, derived once for every model.
 
-Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own
-error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
+Forward, engine `loop`: rounded thresholds, start memory and stage constants shift a play by no more than their own
+error, because a play never amplifies a difference in its input, threshold or start value (3); sums and products add
 their unit roundoffs (`LoopRoundings`).
 
 Engine `corners`: an answer is computed from the corner below it, which is itself an earlier answer, so the roundings of
 up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one answer.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
-residual eta. This requires a solution to stop where another play would follow: on the straight piece up to there, of
-slope P_k, an output error eta becomes eta / P_k in w, but beyond it that error in w would count with a steeper slope.
-Engine `loop` stops there; engine `corners` switches to the steeper piece early, by as much as rounding can amount to.
-Neither answers a move with one in the other direction, which would have the same effect on plays that follow after a
-turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the
-sum of |q_i|), and the front divides that by its smallest slope. A clamp or commit gives both the same drive and adds
-nothing.
+residual eta. This requires a solution to stop where the next play would begin to follow: on the linear piece up to that
+point, of slope P_k, an output error eta becomes eta / P_k in w; beyond it, that error in w would meet a steeper slope.
+Engine `loop` stops at the point; engine `corners` switches to the steeper piece early, by the largest rounding error.
+Neither answers a move with a move in the opposite direction, which would have the same effect on plays that follow
+after a turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays
+(the sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits act on both alike.
 
 With two branches, two drives can give the same output, one on each branch, and rounding decides between them if the
-reference moves by less than a rounding. Both outputs are within the bound; the drives then differ by the gap between
-the branches at the input of the plays, now and in the plays' memory, and the bound includes that. The first move starts
-from the drive of the start memory, G_R^-1(s_0), which need not be a number of the type. The forward operator knows on
-which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
+reference moves by less than a rounding error. Both outputs are within the bound; the drives then differ by the gap
+between the branches, at the input of the plays now and in their memory, and the bound includes that. The first move
+starts from the drive of the start memory, G_R^-1(s_0), which may not be representable in the type. The forward operator
+knows on which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from hystgen.front.tanh import kernels
 from hystgen.front.tanh.model import TanhEnvelope
 
 UNSLEWED = "no slew limit acts"
-"""A condition of a bound, in words."""
+"""A condition on a bound, in words."""
 
 SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computation itself
 
@@ -46,7 +45,7 @@ SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computati
 class ErrorBounds:
     """Largest differences from the exact model: `forward` in output units, `inverse` in drive units (inf: no inverse).
 
-    `rounding` is the part of `inverse` that remains if both take the same branch.
+    `rounding` is the part of `inverse` that remains when both take the same branch.
     """
 
     forward: float
@@ -55,7 +54,7 @@ class ErrorBounds:
 
 
 def together(*conditions: str) -> str:
-    """Join conditions that all have to hold, in words; empty ones are dropped."""
+    """Join conditions that must all hold, in words; empty ones are dropped."""
     *others, last = [each for each in conditions if each] or [""]
     return f"{', '.join(others)} and {last}" if others else last
 
@@ -72,7 +71,7 @@ def largest_sum(cascade: StaticModel) -> float:
 def _stage_errors(
     stage: Stage, low: float, high: float, eps: float, kind: str, ascending: bool
 ) -> tuple[float, float, float]:
-    """Error of the stage's value, error of its inverse (as an error of the value), and largest |slope|."""
+    """Error of the stage's value, error of its inverse (expressed in the value), and largest |slope|."""
     x = max(abs(low), abs(high))
     y = max(abs(end) for end in stage.image(low, high, ascending))
     slope = max(abs(s) for s in stage.slope_range(low, high, ascending))
@@ -90,12 +89,12 @@ class CornerRoundings:
     """Roundings of the corner engine, derived operation by operation from `c_runtime/plays/corners_float.c`.
 
     `forward`, `inverse`: error that one answer adds to the sum of the plays, for plays that have seen the same inputs,
-    in output units; `early`: how much too early plays follow in the inverse, in output units; `margin`: how far an
-    answer along a line can lie beyond the exact one, in units of the plays' input.
+    in output units; `early`: by how much plays follow too early in the inverse, in output units; `margin`: how far an
+    answer along a line can overshoot the exact one, in units of the plays' input.
 
     With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays and T its travel, outputs are at most
-    C W and change by at most C T. A table entry or an operation adds u times the size of its result; an error of the
-    plays' input counts C times in the output.
+    C W and change by at most C T. A table entry or an operation adds u times the size of its result; an error in the
+    plays' input becomes C times that error in the output.
     """
 
     forward: float
@@ -105,7 +104,7 @@ class CornerRoundings:
 
     @classmethod
     def of(cls, cascade: StaticModel, kind: str) -> CornerRoundings:
-        """The roundings of a model in 'float32' or 'float64'; zero if the range of the drive has no ends."""
+        """The roundings of a model in 'float32' or 'float64'; zero if the drive's range is unlimited."""
         if not all(math.isfinite(end) for end in cascade.input_range):
             return cls(0.0, 0.0, 0.0, 0.0)
         u = float(np.finfo(kind).eps) / 2
@@ -121,7 +120,7 @@ class CornerRoundings:
         inverse = line + c * drives + early
         # forward: begin (table, sum), its distance, gain and product; reach (table), two sums of outputs; blocks
         forward = c * (w + travel) + 3 * c * travel + c * (2 * w + travel) + c * (w + travel)
-        # where the limit is reached: two differences of drives, slope, product and sum; then as for an answer
+        # at the limit: two differences of drives, slope, product and sum; then as for an answer
         least = min(abs(p) for p in np.cumsum(pi.weights)) if not cascade.inverse_problems() else math.inf
         margin = drives + 2 * travel + (line + c * (w + 4 * travel) + early) / least
         return cls(u * forward, u * inverse, u * early, SECOND_ORDER * u * margin)
@@ -134,9 +133,9 @@ class LoopRoundings:
     `level`: the largest sum of the plays, in output units; `summed`: error of that sum, for plays that have seen the
     same inputs; `solved`: error that solving for their input adds, in output units.
 
-    A play is at most Z_i = max(|low + r_i|, |high - r_i|, |start|) away from 0. Rounding its threshold and adding it
-    moves the play by at most u (Z_i + r_i). A rounded weight and its product add 2 u p_i Z_i, and each of n sums adds u
-    times the level.
+    A play is at most Z_i = max(|low + r_i|, |high - r_i|, |start|) from 0. Rounding its threshold and adding it shifts
+    the play by at most u (Z_i + r_i). A rounded weight and its product add 2 u p_i Z_i, and each of n sums adds u times
+    the level.
     """
 
     level: float
@@ -160,7 +159,7 @@ class LoopRoundings:
 
 
 def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
-    """Forward error, and residual eta of the inverse, in output units for one arithmetic."""
+    """Forward error and the inverse's residual eta for one arithmetic, in output units."""
     eps = float(np.finfo(kind).eps) / 2
     pi = cascade.pi
     total = math.fsum(abs(p) for p in pi.weights)
@@ -193,7 +192,7 @@ def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
 def error_bounds(cascade: StaticModel, arithmetic: str, engine: str) -> ErrorBounds:
     """Bounds for `arithmetic` 'float32' or 'float64' and `engine` 'corners' or 'loop', against the double model.
 
-    They include the double model's own rounding. The inverse bound never exceeds the drive range, which both respect.
+    They include the double model's own rounding. The inverse bound never exceeds the drive range, which limits both.
     """
     forward, residual = _one(cascade, arithmetic, engine)
     own_forward, own_residual = _one(cascade, "float64", "corners")

@@ -1,9 +1,9 @@
 """The inverse of a model with effects for a known reference, in double precision and for any sample times.
 
-The compensator keeps only the actuator's states. In each sample it solves for the drive from the output backwards,
-block by block, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
+The compensator keeps only the actuator's states. In each sample it solves for the drive block by block, from the output
+backwards, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
 
-The reference is read as in the C: with the same weights of its samples, at the steps of the record. Only `quiet` and
+The reference is read as in the C, with the same weights for its samples, at the record's sample times. Only `quiet` and
 `max_rate` are ignored, since double precision has no codes between which a drive could dither.
 """
 
@@ -27,27 +27,27 @@ from hystgen.effects.part import Following, Leading
 from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
-"""Largest relative difference between steps that count as equal: about the error of a mode's inverse, `w0^2 T^2/12`,
-which is 9e-4 with 60 samples in a period."""
+"""Largest relative difference between time steps that count as equal: about the error of a mode's inverse,
+`w0^2 T^2/12`, which is 9e-4 with 60 samples per period."""
 
 ROUNDING = 1e-14
-"""Relative change of a number below which it counts as rounding: about a hundred roundings of 1.1e-16."""
+"""Relative change below which a difference counts as rounding: about a hundred roundings of 1.1e-16."""
 
 FINEST = 1e-16
-"""[share of the larger end] Width of an interval in which a search for an input stops: below the last bit of that end,
-so that the search of an input near 0 stops too."""
+"""[share of the larger end] Interval width at which the search for an input stops: below the last bit of that end, so
+that a search that ends near 0 stops too."""
 
 TURNS = 8
-"""Most iterations in a sample if the gain depends on the drive sought. 500 jumps over a quarter of the range, with a
-loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
+"""Maximum iterations per sample if the gain depends on the drive to be found. 500 jumps by a quarter of the range, with
+a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
 
 STANDARD = Compensation()
 
 
 class FrontAndPlays(Block):
-    """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out.
+    """The memoryless front and the plays as one block: input is the drive (behind a lag), output the weighted sum.
 
-    A move back by at most `slack` does not count.
+    A move back by at most `slack` is ignored.
     """
 
     def __init__(self, chain: Chain) -> None:
@@ -61,7 +61,7 @@ class FrontAndPlays(Block):
         self.start_over()
 
     def start_over(self) -> None:
-        """Back to the start memory."""
+        """Return to the start memory."""
         self.plays = self.start.copy()
         self.ascending = self.rises = True
         at = float(self.start[0])
@@ -73,7 +73,7 @@ class FrontAndPlays(Block):
         self.seconds = seconds
 
     def moved(self, w: float) -> Array:
-        """The plays (n + 1) after their input has gone to w."""
+        """The plays (n + 1) after their input has moved to w."""
         if self.movement is None or math.isinf(self.seconds):
             return np.asarray(np.minimum(np.maximum(self.plays, w - self.r), w + self.r))
         return self.movement.after(self.plays, float(self.plays[0]), w, self.seconds)
@@ -83,16 +83,16 @@ class FrontAndPlays(Block):
         return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
     def call(self, verb: str, x: float) -> float:
-        """Solve or absorb, since the first move, from plays at rest in the start memory, is a move like any other."""
+        """Solve or absorb, even for `rest` and `resting`: the first move, from the start memory, is like any other."""
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
         """The drive on the branch of its own move. It stays on its branch while it moves on or holds, and turns only to
         go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
 
-        A lag misses `theta` of the way to the other branch. Holding then never misses more than turning at once would
-        have; for any other share the miss can reach at least `1 + theta` times that of a drive that knows how far the
-        reference will go back. `rises` says which way the drive is to go.
+        A lag falls short by `theta` of the distance to the other branch. With this share as the limit, holding never
+        misses by more than an immediate turn would; with any other share the miss can reach at least `1 + theta` times
+        that of a drive that knows how far the reference will go back. `rises`: whether the drive is about to rise.
         """
         w = self._input(y)
         if not self.static.branches_differ:
@@ -113,7 +113,7 @@ class FrontAndPlays(Block):
         return other
 
     def absorb(self, x: float) -> float:
-        """Move the plays; the direction of the move picks the branch."""
+        """Move the plays; the direction of the move selects the branch."""
         back = self.drive - x if self.ascending else x - self.drive
         if back > self.slack:
             self.ascending = not self.ascending
@@ -130,7 +130,7 @@ class FrontAndPlays(Block):
         before = self.total(self.moved(w))
         if y == before:
             return w
-        way = (y - before) / float(self.p[0])  # for the least slope, unless an effect bends the plays
+        way = (y - before) / float(self.p[0])  # at the least slope, unless an effect bends the plays
         for _ in range(64):
             far = w + way
             if (left := self.total(self.moved(far)) - y) * (before - y) <= 0.0:
@@ -139,10 +139,10 @@ class FrontAndPlays(Block):
         raise EffectsError(f"no input of the plays gives {y:g}")
 
     def _between(self, y: float, one: tuple[float, float], other: tuple[float, float]) -> float:
-        """The input at which the sum is `y`, between two inputs, each with the error of its sum.
+        """The input at which the sum is `y`, between two inputs given with the errors of their sums.
 
-        False position with the weight of an end that stays halved (Illinois: Dowell and Jarratt, BIT 11 (1971) 168),
-        down to neighbouring numbers.
+        False position that halves the weight of an end that stays (Illinois: Dowell and Jarratt, BIT 11 (1971) 168),
+        down to adjacent numbers.
         """
         (a, missed), (b, left) = one, other
         while left and abs(b - a) > FINEST * max(abs(one[0]), abs(other[0])):
@@ -157,9 +157,9 @@ class FrontAndPlays(Block):
         return b
 
     def _scan(self, y: float) -> float:
-        """As `_input`, for plain plays: finds the straight piece of the move's curve on which the sum is `y`."""
+        """As `_input`, for plain plays: finds the linear piece of the move's curve on which the sum is `y`."""
         sign = 1.0 if y >= float(self.p @ self.plays) else -1.0
-        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # by the plays above each one
+        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # contribution of the plays above each one
         inputs = self.plays + sign * self.r  # where each one begins to follow
         levels = self.c * inputs - sign * self.q + held
         k = max(int(np.searchsorted(sign * levels, sign * y, side="right")) - 1, 0)
@@ -168,12 +168,12 @@ class FrontAndPlays(Block):
 
 
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
-    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects that are asked for
+    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects to be compensated
     nevertheless."""
     for part in PARTS:
         if (alone := part.unmeasured) and alone.key not in compensate and part.takes(effect):
             write = f"emit: {{compensation: {{compensate: [{alone.key}]}}}}"
-            return f"{alone.known}; to have it all the same, write {write})"
+            return f"{alone.known}; to compensate it anyway, write {write})"
     if effect.name not in CATALOGUE and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
@@ -185,11 +185,11 @@ def filter_block(effect: Effect) -> Block | None:
 
 
 class Compensator:
-    """Drives for a reference; leaves out a sensor's own nonlinearity, since the reference is the true displacement.
+    """Drives for a reference; ignores the sensor's own nonlinearity, since the reference is the true displacement.
 
     `how`: how the reference is read, in samples of the record, and which unmeasured effects are compensated: `drift`,
     which begins at t = 0, and `self_heating`. `as_emitted`: lead a lag in front of two branches however short it is, as
-    the C does, whose drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    the C does because its drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
     """
 
     def __init__(self, chain: Chain, how: Compensation = STANDARD, as_emitted: bool = False) -> None:
@@ -201,7 +201,7 @@ class Compensator:
             raise NotInvertibleError(missing)
         refused = [reason for effect in effects if (reason := refusal(effect, how.compensate))]
         if refused:
-            raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
+            raise UnsupportedEffectsError(f"the inverse cannot include {', '.join(refused)}; remove it from the model")
         self.static, self.effects, self.how = static, effects, how
         drives, outputs = (
             [block for effect in chain.at(place) if (block := filter_block(effect))]
@@ -210,7 +210,7 @@ class Compensator:
         self.actuator = FrontAndPlays(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self.parts.slew
-        self.rest = 0.0  # rounding remainder of a slew-limited drive: it would add up over millions of steps
+        self.rest = 0.0  # rounding remainder of a slew-limited drive, which would add up over millions of steps
         self.ends: Sequence[tuple[float, float]] = ()
         lags = [block for block in drives if isinstance(block, Leading)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
@@ -226,12 +226,12 @@ class Compensator:
         self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None,
         held: NDArray[np.bool_] | None = None,
     ) -> tuple[Array, Array]:
-        """Drives (N,) within `ends` for the reference in `reference.v`, and how far each was limited to them.
+        """Drives (N,) within `ends` for the reference in `reference.v`, and how much limiting changed each.
 
         `asked` (N,): which samples of `reference.v` are references. Samples before the first reference are drives;
         between references the drive holds. Everything is at rest at the first sample. After the last sample the
-        reference keeps its value. `held` (N,): samples without a reference of their own, at which the drive holds as in
-        the C; the preview reads on in `reference.v`.
+        reference keeps its value. `held` (N,): samples without a reference, at which the drive holds as in the C, while
+        the preview goes on reading `reference.v`.
         """
         asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
         held = np.zeros(len(reference.t), dtype=bool) if held is None else held
@@ -247,7 +247,7 @@ class Compensator:
         for k in range(n):
             seconds = steps[k - 1] if k else 0.0
             for block in self.blocks:
-                if k or block is not self.actuator:  # the actuator starts over without time
+                if k or block is not self.actuator:  # no time has passed for the actuator at its start
                     block.advance(steps[max(k - 1, 0)], steps[min(k, len(steps) - 1)])
             before = float(v[k - 1]) if k else math.nan
             drive = before
@@ -280,7 +280,7 @@ class Compensator:
         return v, beyond
 
     def _following(self) -> list[Following]:
-        """The gains that follow the drive, from its start on."""
+        """The gains that depend on the drive, at their start."""
         listed = [(part, effect) for part in BEHIND for effect in self.parts.blocks[part.name]]
         return [each for part, effect in listed if (each := part.following(effect))]
 
@@ -290,7 +290,7 @@ class Compensator:
         return y
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
-        """The nearest drive that the amplifier can reach in this time, or one that keeps a lag from overshooting."""
+        """The nearest drive that the amplifier can reach in this time, or one at which a lag does not overshoot."""
         falling: float = min(effect.falling_rate for effect in self.slew) * seconds
         rising: float = min(effect.rate for effect in self.slew) * seconds
         low, high = self.ends = [ramp(before, self.rest, move, 0.0) for move in (-falling, rising)]
@@ -300,7 +300,7 @@ class Compensator:
         return min(max(near, low[0]), high[0])
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
-        """Gain and offset (N,) for each logged temperature, at the time when a sample's drive takes effect."""
+        """Gain and offset (N,) for each logged temperature, at the time at which a sample's drive takes effect."""
         ahead = reference.t + self.parts.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
@@ -335,8 +335,8 @@ class Compensator:
         return target
 
     def reading(self, step: float) -> Read:
-        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError if no averages hold the
-        noise gain."""
+        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError if no averages keep the
+        noise gain within its limit."""
         found = read(self.static, self.parts, step, self.how)
         if self.how.noise_gain is not None:
             gain = noise.largest(noise.Gain(self.static, self.parts, step, found.taps or preview.PLAIN))
@@ -345,9 +345,9 @@ class Compensator:
 
 
 def _even_step(t: Array, asked: NDArray[np.bool_], what: str) -> float:
-    """The time in s between two references. Raises EffectsError if `what` needs even steps and they are uneven."""
+    """The time between two references in s. Raises EffectsError, for `what`, if they are not evenly spaced."""
     steps = np.diff(t)[asked[1:] & asked[:-1]]
     step = float(np.median(steps)) if len(steps) else 1.0
     if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:
-        raise EffectsError(f"{what} needs samples at even times; resample the reference")
+        raise EffectsError(f"{what} needs evenly spaced samples; resample the reference")
     return step

@@ -1,8 +1,8 @@
 """The engine of a model and its code size, from tables measured on emulated cores.
 
-`benchmarks/engine_costs.py` makes two tables: `engine_costs.csv`, the instructions per sample as a mean over a decaying
-multisine, and `code_sizes.csv`, the bytes of code of a module, the larger figure of two compilers. The code that
-effects add is in `effect_sizes.csv`, made by `benchmarks/effect_costs.py`; the most expensive sample and its stack in
+`benchmarks/engine_costs.py` makes two tables: `engine_costs.csv`, instructions per sample averaged over a decaying
+multisine, and `code_sizes.csv`, bytes of code per module, the larger figure of two compilers. The code that effects add
+is in `effect_sizes.csv`, made by `benchmarks/effect_costs.py`; the most expensive sample and its stack are in
 `step_costs.csv`, made by `benchmarks/step_costs.py`.
 """
 
@@ -29,14 +29,14 @@ SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
 def choose(
     engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool = False
 ) -> str:
-    """The engine that `auto` stands for; an explicit one is kept, but a model without plays always takes `loop`.
+    """The engine that `auto` stands for; an explicit choice is kept, but a model without plays always gets `loop`.
     `effects`: whether the model has any; none may move or bend plays.
 
     `optimize` speed: fewer instructions, as a geometric mean over both cores; size: less code on both cores; auto: the
-    smaller sum of a small controller's shares of flash and time, which breaks even at `FLASH / CYCLES`, 6.8 bytes of
-    code per instruction and sample. Instructions of both operators add up. With effects in fixed point only speed
-    chooses `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is promised 128.
-    Raises ValueError for other words.
+    smaller sum of the shares of a small controller's flash and time, which breaks even at `FLASH / CYCLES`, 6.8 bytes
+    of code per instruction and sample. Instructions of both operators add up. With effects in fixed point only `speed`
+    can select `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is promised 128.
+    Raises ValueError for any other value.
     """
     for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
         if value not in known:
@@ -57,7 +57,7 @@ def code_bytes(cascade: StaticModel, operator: str, arithmetic: str, engine: str
 
 
 def kind(cascade: StaticModel, arithmetic: str) -> str:
-    """The properties of a model that its code depends on: the memoryless stages (in fixed point only whether there are
+    """The properties of a model on which its code depends: the memoryless stages (in fixed point only whether there are
     any) and the branches."""
     if not cascade.stages:
         return "pi"
@@ -67,7 +67,7 @@ def kind(cascade: StaticModel, arithmetic: str) -> str:
 
 
 class Dearest(NamedTuple):
-    """The most expensive sample: its instructions, and the bytes of stack of the deepest call."""
+    """The most expensive sample: its instructions, and the stack of the deepest call in bytes."""
 
     instructions: int
     stack: int
@@ -76,9 +76,9 @@ class Dearest(NamedTuple):
 def dearest(
     cascade: StaticModel, operator: str, arithmetic: str, engine: str, parts: Iterable[str] | None = None
 ) -> dict[str, Dearest]:
-    """The most expensive sample of an operator on each of `CORES`, estimated from measured models: its plays, the extra
-    cost of its memoryless part and of each of the `parts` of effects, and the largest stack of them. `parts`: None
-    without effects."""
+    """The most expensive sample of an operator on each of `CORES`, estimated from measured models: the cost of its
+    plays plus that of its memoryless part and each of the effects' `parts`, and the largest stack among them. `parts`:
+    None without effects."""
     front = kind(cascade, arithmetic)
     more = [] if front == "pi" else [(front, engine)]
     more += [(part, "loop") for part in parts or () if (part, arithmetic, "loop", operator) in _steps()]
@@ -94,7 +94,7 @@ def dearest(
 
 
 def _between(measured: Mapping[int, Mapping[str, str]], n: int, core: str) -> Dearest:
-    """The figures for `n` plays, interpolated linearly between the rows on either side, or those of the only row."""
+    """The figures for `n` plays, interpolated linearly between the nearest rows, or taken from the only row."""
     rows = sorted(measured)
     above = next((at for at in rows[1:] if at >= n), rows[-1])
     below = rows[max(rows.index(above) - 1, 0)]
@@ -105,14 +105,14 @@ def _between(measured: Mapping[int, Mapping[str, str]], n: int, core: str) -> De
 
 
 def effect_bytes(arithmetic: str, engine: str) -> Mapping[str, int]:
-    """Bytes of code that any effect adds to an operator."""
+    """Bytes of code that having any effect at all adds to an operator."""
     return effect_sizes()["any" if engine == "loop" else "any_corners", arithmetic]
 
 
 def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool) -> float:
     operators = ("forward", "inverse") if operator == "both" else (operator,)
     code = dict(code_bytes(cascade, operator, arithmetic, engine))
-    if effects:  # each single effect adds the same with both engines
+    if effects:  # each individual effect adds the same with both engines
         more = effect_bytes(arithmetic, engine)
         code = {core: size + len(operators) * more[core] for core, size in code.items()}
     if optimize == "size":
@@ -132,7 +132,7 @@ def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arith
 
 @functools.cache
 def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, str]]]:
-    """Rows with the instructions per sample by number of plays, for each operator, arithmetic, kind and engine."""
+    """Rows of instructions per sample by number of plays, for each operator, arithmetic, kind and engine."""
     found: dict[tuple[str, str, str, str], dict[int, dict[str, str]]] = {}
     for row in _rows("engine_costs.csv"):
         about = (row["operator"], row["arithmetic"], row["kind"], row["engine"])
@@ -159,7 +159,7 @@ def _code_sizes() -> dict[tuple[str, str, str, str], dict[str, int]]:
 
 @functools.cache
 def _steps() -> dict[tuple[str, str, str, str], dict[int, dict[str, str]]]:
-    """Rows with the most expensive sample by number of plays, for each part, arithmetic, engine and operator."""
+    """Rows of the most expensive sample by number of plays, for each part, arithmetic, engine and operator."""
     found: dict[tuple[str, str, str, str], dict[int, dict[str, str]]] = {}
     for row in _rows("step_costs.csv"):
         about = (row["part"], row["arithmetic"], row["engine"], row["operator"])

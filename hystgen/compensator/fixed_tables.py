@@ -1,19 +1,19 @@
-"""Fixed-point form of a model: whole numbers, formats, ranges and error bounds.
+"""Fixed-point form of a model: integers, formats, ranges and error bounds.
 
-Everything is computed in fractions from the exact parameters, so that the same model gives the same numbers anywhere;
+Everything is computed in fractions from the exact parameters, so that a model gives the same numbers on every machine;
 only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
 Ranges. The drive is limited to `input_range`, so the input w of the plays, every play and every corner stay between the
 extremes of three things: the image of the range, the start memory, and 0, where a reset begins. That bounds every sum.
 The format is the finest one in which sums leave one of 64 bits unused, table entries one of 32, and the outputs kept by
-corners fit their fields. In q15 these have 47 bits, which the input of the plays and the slopes share: 26 and 21 or 22.
-Compared with 30 and 31 bits, that widens the bounds of 160 models of the oracle (seeds 100 to 259) by a median of 0.8 %
-without a memoryless part and 1.5 % with one, and for a tenth of the models by more than 2.1 and 3.5 %. With 25 bits of
-input these figures are 0.5 and 1.8 %, 1.4 and 5.5 %; with 27 all are larger.
+corners fit their fields. In q15 these have 47 bits, divided between the input of the plays and the slopes: 26 and 21 or
+22. Compared with 30 and 31 bits, that widens the bounds of the oracle's 160 models (seeds 100 to 259) by a median of
+0.8 % without a memoryless part and 1.5 % with one, and by more than 2.1 and 3.5 % for a tenth of the models. With 25
+bits of input these figures are 0.5 and 1.8 %, 1.4 and 5.5 %; with 27 all are larger.
 
-Errors. The drive is exact, as it is sent. Rounded thresholds and start states move a play by no more than their own
-error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
-thresholds; an output is rounded once. The inverse is as in `hystgen.compensator.bounds`: the exact model, driven as
+Errors. The drive as sent is exact. Rounded thresholds and start states shift a play by no more than their own error
+(3); rounding in the sums of weights is summed by parts, because adjacent plays differ by no more than their thresholds
+do; an output is rounded once. The inverse is as in `hystgen.compensator.bounds`: the exact model, fed the drive as
 sent, misses the reference by a residual, and the exact inverse amplifies that by at most `2/p_0 - 1/C_n`.
 """
 
@@ -42,13 +42,13 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 
 SUM_BITS = 62
-"""Bits of a sum of products without its sign: 64 bits then hold the difference of two such sums."""
+"""Bits of a sum of products, excluding its sign: 64 bits then hold the difference of two such sums."""
 
 TABLE_MAX = 2**31 - 1
-"""Largest number in a table, an int32_t in C."""
+"""Largest table entry, an int32_t in C."""
 
 MOST_PIECES = 2000
-"""[pieces] Most in a curve: this many cubic ones take 42 kB of flash, more than the smallest cores have."""
+"""[pieces] Maximum per curve: this many cubic pieces take 42 kB of flash, more than the smallest cores have."""
 
 FAR = 2.0**40
 """[steps of the plays' input] Represents infinity: inputs of plays have 31 bits."""
@@ -59,8 +59,8 @@ class Format:
     """The meaning of a model's codes, and its accuracy.
 
     `drive_lsb`, `output_lsb`: physical units per code; `forward_error` in output codes, `inverse_error` in drive codes
-    (None: no inverse), `inverse_rounding`: its part on the same branch; `largest_sum`: bound on every sum, below 2^62;
-    `largest_held`: bound on every output that a corner keeps; `sum_bits`: fraction bits of a sum below an output code.
+    (None: no inverse), `inverse_rounding`: the part of it on the same branch; `largest_sum`: bound on every sum, below
+    2^62; `largest_held`: bound on every output that a corner keeps; `sum_bits`: bits of a sum below an output code.
     """
 
     drive_lsb: Fraction
@@ -108,10 +108,9 @@ def lsbs(
     cascade: StaticModel, arithmetic: str, drive_lsb: float | None = None, output_lsb: float | None = None,
     output_range: tuple[float, float] | None = None,
 ) -> tuple[Fraction, Fraction]:
-    """Physical units per drive code and per output code: as given, else the finest that reach the ends of the ranges.
+    """Physical units per drive code and per output code: as given, else the finest that cover the ranges.
 
-    `output_range`: the range of a model with effects. Raises FormatError for an LSB that is too small, and for an
-    output that stays 0.
+    `output_range`: the range of a model with effects. Raises FormatError if an LSB is too small or the output stays 0.
     """
     code_max = FIXED[arithmetic].code_max
     found: list[Fraction] = []
@@ -139,7 +138,7 @@ def lsbs(
 
 
 def _rounded_up(x: Fraction) -> str:
-    """A positive number to six digits, rounded up."""
+    """A positive number rounded up to six digits."""
     up = Context(prec=6, rounding=ROUND_CEILING)
     return f"{float(up.divide(Decimal(x.numerator), Decimal(x.denominator))):.6g}"
 
@@ -152,7 +151,7 @@ def decimal(x: float) -> Fraction:
 class Builder:
     """The steps of `build`, each of which uses the results of those before it.
 
-    `given`: which LSBs were asked for; `beyond`: how far beyond its range the input of the plays may be asked for, in
+    `given`: which LSBs the user set; `beyond`: how far beyond its range the input of the plays may be requested, in
     spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as behind a lag; `bent`:
     the most that an effect adds to a play's contribution, in units of the play's input.
     """
@@ -197,8 +196,8 @@ class Builder:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
-        # an end that double precision may have moved off a code counts as that code: by 2^-50, or 8 roundoffs, but not
-        # by more than a thousandth of a code where the terms of a sum cancel
+        # rounding in double precision may have moved an end off its code; allow 2^-50, or 8 roundoffs, but at most a
+        # thousandth of a code, in case the terms of a sum cancel
         size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
         slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
         self.output = (math.ceil(low - slack), math.floor(high + slack))
@@ -218,13 +217,13 @@ class Builder:
             raise FormatError(*self.refused)
 
     def _finer(self, key: str) -> str:
-        """Advice for codes that are too coarse; unless an LSB is set, they are already the finest possible."""
+        """Advice for codes that are too coarse; unless the user set an LSB, they are already the finest possible."""
         return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
 
     # ------------------------------------------------------------ the input of the plays
 
     def _plays(self) -> None:
-        """Step of w, and in that step thresholds, start states and curves."""
+        """The step of w, and thresholds, start states and curves in units of it."""
         c, pi = self.cascade, self.cascade.pi
         # where plays can be: in the range of their input, at the start memory, or at 0 after a reset
         low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
@@ -245,10 +244,10 @@ class Builder:
 
         states = [nearest(Fraction(s) / self.step) for s in pi.start]
         if c.stages:
-            cap = math.floor(self.span / self.step) + 8  # rounding of the curves can add 8 steps
+            cap = math.floor(self.span / self.step) + 8  # rounding in the curves can add 8 steps
         else:
             cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
-        # no input is farther than `cap` from a play, so a play with such a threshold never moves
+        # no input is farther than `cap` from a play, so a play with that threshold never moves
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
         self.still = max(bisect.bisect_left(self.threshold, cap), 1)
         for i in range(2, self.still):
@@ -284,10 +283,10 @@ class Builder:
         self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # where plays can be
 
     def _hold(self, states: list[int]) -> None:
-        """Put all plays that never move at their weighted mean, which keeps their part of the output.
+        """Put all plays that never move at their weighted mean, which leaves their contribution unchanged.
 
-        Their thresholds, cut to fit, may leave too little room for their start states; they are widened until the mean
-        is admissible beside the previous play, or to the width of the type, with the mean limited.
+        Their thresholds, cut to fit, may leave too little room for their start states, so they are widened until the
+        mean is admissible next to the previous play; if the type is too narrow for that, the mean is limited.
         """
         pi, k = self.cascade.pi, self.still
         weights = [Fraction(p) for p in pi.weights[k:]]
@@ -312,7 +311,7 @@ class Builder:
             return
         lsb, step = float(self.drive_lsb / 2**self.fine), float(self.step)
         degree = FIXED[self.arithmetic].degree
-        # a curve's own error: a 64th of a code, or rounding if codes are that fine
+        # a curve's own error: a 64th of a code, or the rounding error if codes are that fine
         allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
         breaks = _breaks(c)
         for ascending in (True, False):
@@ -326,7 +325,7 @@ class Builder:
         for up in (True, False):
             bottom, top = (math.floor(min(max(end / step, -FAR), FAR)) for end in _envelope_ends(c, up))
             self.arguments.append((bottom, top))
-            if top < FAR:  # far enough to notice an input beyond the envelope
+            if top < FAR:  # far enough to detect an input beyond the envelope
                 noticed = max(top - self.play[1], self.play[0] - bottom)
                 self.margin = max(self.margin, min(noticed, 1 << self.play_bits) + 2)
         self.arguments *= 2
@@ -397,7 +396,7 @@ class Builder:
         limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX] = self.drive
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = self.output
         limits[slots.OFFSET] = self.offset
-        far = 2 * max(map(abs, c.input_range))  # equivalent to any drive beyond it, and finite
+        far = 2 * max(map(abs, c.input_range))  # acts like any drive beyond the range, and is finite
 
         def code(v: float) -> Fraction:
             return Fraction(min(max(v, -far), far)) / self.drive_lsb
@@ -462,7 +461,7 @@ class Builder:
     def _play_errors(self) -> list[Fraction]:
         """Largest error of each play against the exact model, in physical units of w.
 
-        Plays that never move count together; in the exact model one may move, by less than its rounded threshold shows.
+        Plays that never move are held at their mean; in the exact model such a play may move by `span - r`.
         """
         pi = self.cascade.pi
         front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))
@@ -487,17 +486,17 @@ class Builder:
         return plays + weights + self.offset_error
 
     def _own_error(self) -> tuple[Fraction, Fraction]:
-        """Rounding of the double model itself on one branch: forward in output units, inverse in drive units."""
+        """Rounding error of the double model itself on one branch: forward in output units, inverse in drive units."""
         own = error_bounds(self.cascade, "float64", "corners")
         return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
     def drive_short(self) -> Fraction:
-        """Largest distance of the first and last drive codes from the ends of the range, in drive units."""
+        """Larger distance of the first or last drive code from its end of the range, in drive units."""
         (first, last), (low, high) = self.drive, self.cascade.input_range
         return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
 
     def _forward_error(self) -> float:
-        # a code beyond the range is limited to the last code inside, while the exact model goes to the range's end
+        # a code beyond the range is limited to the last code inside, the exact model's drive to the end of the range
         limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self.drive_short()
         return upward(
             self.sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
@@ -561,7 +560,7 @@ def upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError if there are too many."""
+    """Drives at which the memoryless part has a kink, by branch. Raises FormatError if there are too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
         if not ascending and not cascade.branches_differ:
@@ -577,14 +576,14 @@ def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
             if low < b < high
         ]
         if len(inside) > MOST_PIECES:
-            what = f"bends at {len(inside)} places inside input_range, and fixed point takes {MOST_PIECES}"
+            what = f"has {len(inside)} kinks inside input_range, and fixed point takes at most {MOST_PIECES}"
             raise FormatError((("model", "memoryless"), f"{what}; thin out the thresholds or use float32"))
         found[ascending] = sorted(_drive_at(cascade, j, b, ascending) for j, b in inside)
     return found
 
 
 def _envelope_ends(cascade: StaticModel, ascending: bool) -> tuple[float, float]:
-    """The values of w at which the last envelope saturates; infinite without one."""
+    """The values of w at which the last envelope saturates; infinite without an envelope."""
     last = max((j for j, stage in enumerate(cascade.stages) if isinstance(stage, TanhEnvelope)), default=None)
     if last is None:
         return -math.inf, math.inf
@@ -624,11 +623,11 @@ class _Piece:
 
 
 class FixedCurve:
-    """A function of whole numbers as a piecewise polynomial; `error`: how far its values can be from the function's.
+    """A function of integers as a piecewise polynomial; `error`: largest difference between it and the function.
 
     It interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
-    `corners`: places of kinks; `below`: bits of a value below a code; `edge`: how far rounding can take an argument out
-    of the domain.
+    `corners`: arguments of kinks; `below`: bits of a value below a code; `edge`: how far rounding can take an argument
+    out of the domain.
     """
 
     def __init__(
@@ -656,11 +655,11 @@ class FixedCurve:
                 continue
             self.fit_error = max(self.fit_error, miss)
             self.pieces.append(piece)
-        # each coefficient and each product is rounded; a quarter more for errors between the samples
+        # each coefficient and each product is rounded; errors between the samples are allowed a quarter more
         self.error = 1.25 * self.fit_error + degree + 0.5
 
     def _fit(self, a: int, b: int, allowed: float) -> tuple[_Piece, float]:
-        """The piece from a up to b, and its sampled error, or the first that is more than allowed."""
+        """The piece from a up to b, and its largest sampled error, or the first one above `allowed`."""
         if b - a == 1:
             first = round(self.function(float(a)))
             kept = _kept(first)
@@ -694,11 +693,11 @@ class FixedCurve:
 
 
 def _kept(value: int) -> int:
-    """The nearest number of the tables' type: rounding at an end of the drive's range can pass its last code."""
+    """The nearest number of the tables' type: rounding at an end of the drive's range can overshoot its last code."""
     return min(max(value, -TABLE_MAX), TABLE_MAX)
 
 
-SAMPLES = 25  # at which a piece's error is evaluated, both ends among them
+SAMPLES = 25  # points at which a piece's error is evaluated, including both ends
 _NODES = {  # cos of the odd multiples of pi / (2 degree + 2), written out: libraries differ in the last bit
     3: (0.9238795325112867, 0.3826834323650898, -0.3826834323650898, -0.9238795325112867),
     5: (0.9659258262890683, 0.7071067811865476, 0.25881904510252074,

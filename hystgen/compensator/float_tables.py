@@ -1,5 +1,5 @@
-"""Floating-point form of a model: the numbers that the kernels work with. For the corner engine they are computed as
-fractions and rounded once."""
+"""Floating-point form of a model: the constants of its kernels. Those of the corner engine are computed as fractions
+and rounded once."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def _stage_numbers(
 
 @dataclass(frozen=True)
 class _Sums:
-    """The plays' numbers as fractions: thresholds r, weights p, C_k = p_0 + .. + p_k, Q_k = p_0 r_0 + .. + p_k r_k and
-    z_k = C_k r_k - Q_k, the thresholds of the inverse (36)."""
+    """The plays' constants as fractions: thresholds r, weights p, C_k = p_0 + .. + p_k, Q_k = p_0 r_0 + .. + p_k r_k,
+    and z_k = C_k r_k - Q_k, the thresholds of the inverse (36)."""
 
     r: list[Fraction]
     p: list[Fraction]
@@ -90,7 +90,7 @@ class _Sums:
 
 
 def _sums(cascade: StaticModel) -> _Sums:
-    """The exact numbers of a model's plays."""
+    """The exact constants of a model's plays."""
     pi = cascade.pi
     return _Sums([Fraction(r) for r in pi.thresholds], [Fraction(p) for p in pi.weights])
 
@@ -105,7 +105,7 @@ def _forward_curve(cascade: StaticModel, dtype: Any) -> Curve:
 def _inverse_curve(cascade: StaticModel, dtype: Any, limits: Sequence[Any] | None) -> Curve:
     """Input: the sum of the plays; output: their input w. `limits`: of the drive, then of the sum; None for no limits.
 
-    Each play follows a little early, by as much as rounding could otherwise carry an answer past that place.
+    Each play begins to follow early, by as much as rounding could otherwise carry an answer past that point.
     """
     s = _sums(cascade)
     roundings = CornerRoundings.of(cascade, np.dtype(dtype).name)
@@ -139,8 +139,8 @@ def _start(
 ) -> Start:
     """The memory in which play k holds `states[k]`; `curve`: of the operator; `seen`: range of the plays' input.
 
-    A play is entered on that side of its state on which it can begin to follow within the range, since lines from far
-    outside would lose digits. Plays that can do so on neither side belong to the bottom, as do all with larger
+    A play is entered on the side of its state on which it can begin to follow within the range, since lines from far
+    outside would lose digits. The first play that can begin on neither side belongs to the bottom, with all larger
     thresholds.
     """
     s, dtype = _sums(cascade), curve.way.dtype.type
@@ -160,10 +160,10 @@ def _start(
     plays = range(1, len(held))
     risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
     top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
-    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, apart from what
-    # the others hold: lines from two turning points with the same output and inputs on either side of the centre. If
-    # every play can move, any centre will do: it is the same for all start memories, so that a start is forgotten to
-    # the last bit
+    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, plus what the
+    # others hold: lines from two turning points with the same output and inputs on either side of the centre. If every
+    # play can move, any centre is right; it is the same for all start memories, so that a start is forgotten to the
+    # last bit
     k = top - 1
     w = held[top] if top < len(held) else Fraction(min(max(0.0, seen[0]), seen[1]))
     y = s.c[k] * w + _aside(s, held)[k]
@@ -174,7 +174,7 @@ def _start(
 
 
 def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
-    """Contribution to the sum of all plays with larger thresholds, for each play."""
+    """For each play, the contribution of all plays with larger thresholds to the sum."""
     above = [p * w for p, w in zip(s.p, held, strict=True)]
     return [*itertools.accumulate(above[:0:-1], initial=Fraction(0))][::-1]
 
@@ -224,7 +224,7 @@ def build_float(
     products = [p * r for p, r in zip(pi.weights, pi.thresholds, strict=True)]
     slope = [math.fsum(pi.weights[:k]) for k in range(n + 2)]
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
-    # the thresholds z of the inverse (36): output gained before play k starts to follow
+    # the thresholds z of the inverse (36): output gained by the time play k begins to follow
     exact = [Fraction(0), *itertools.accumulate(map(Fraction, pi.weights))]
     rises = [Fraction(b) - Fraction(a) for a, b in itertools.pairwise(pi.thresholds)]
     start_level = [
@@ -282,7 +282,7 @@ def build_float(
         weight=reals(pi.weights, "weights", "pi", "weights"),
         slope=reals(slope, "sums of weights", "pi", "weights"),
         lift=reals(lift, "sums of weight times threshold", "pi"),
-        start_level=reals(start_level, "outputs at which plays start to follow", "pi"),
+        start_level=reals(start_level, "outputs at which plays begin to follow", "pi"),
         inverse_slope=reals(
             [1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights", "pi", "weights"
         ),
@@ -293,7 +293,7 @@ def build_float(
         stage_kind=np.array(kinds, dtype=np.int64),
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),
-        stage_data=reals(numbers, "numbers of the memoryless stages", "memoryless"),
+        stage_data=reals(numbers, "parameters of the memoryless stages", "memoryless"),
         **_corners(cascade, dtype, limits[: slots.OFFSET + 1] if bounded and not cascade.stages else None, seen),
         engine=slots.CORNERS if engine == "corners" else slots.LOOP,
         branches=int(cascade.branches_differ),

@@ -1,4 +1,4 @@
-"""The constants of one model in one arithmetic, as used by the bit reference and the C text, and their limits."""
+"""The constants of one model in one arithmetic, as the bit reference and the C text use them, and clamping."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Tables(NamedTuple):
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Counts  # direction before the first move, in the same order
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
-    stage_first: Counts  # place in stage_data where the stage's numbers begin
+    stage_first: Counts  # index in stage_data of the stage's first number
     stage_size: Counts  # break points of a dead zone
     stage_data: Reals
-    forward: Curve  # of the corner engine, like the next six
+    forward: Curve  # only in the corner engine, like the next six
     inverse: Curve
     forward_first: Start
     forward_zero: Start
@@ -58,13 +58,13 @@ class Tables(NamedTuple):
 
 
 class FixedTables(NamedTuple):
-    """The constants of one model in fixed point; arrays of int64, however narrow in C."""
+    """The constants of one model in fixed point; arrays of int64, even where the C type is narrower."""
 
     threshold: Reals
     weight: Reals
     slope: Reals  # change of the sum per least step of the plays' input
     start_level: Reals
-    way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last one is never reached
+    way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last entry is never reached
     reach: Reals  # 2 start_level: output gained by then
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
@@ -73,12 +73,12 @@ class FixedTables(NamedTuple):
     limits: Reals
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Reals  # direction before the first move, in the same order
-    knot: Reals  # where the pieces of the curves begin, curve after curve
-    coefficient: Reals  # first argument of each piece, curve after curve
+    knot: Reals  # first argument of each piece, curve after curve
+    coefficient: Reals  # of each piece, curve after curve
     scale: Reals  # left shift that stretches a piece to 2^31
     first: Reals  # first piece of each curve
     pieces: Reals
-    domain: Reals  # (4, 2): first and last argument of a curve
+    domain: Reals  # (4, 2): first and last argument of each curve
     edge: Reals  # (4, 2): how far rounding can take an argument beyond them
     argument: Reals  # (4, 2): least and largest argument of the envelopes themselves
     below: Reals  # (4,): bits of a curve's value below a code
@@ -113,7 +113,7 @@ class Limited(Protocol):
 
 @jit(inline=True)
 def clamp_drive(t: Limited, v: N) -> N:
-    """v inside the input range."""
+    """v limited to the input range."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]
     if v > t.limits[DRIVE_MAX]:
@@ -123,7 +123,7 @@ def clamp_drive(t: Limited, v: N) -> N:
 
 @jit(inline=True)
 def inverse_clamp(t: Limited, u: N) -> N:
-    """u inside the output range."""
+    """u limited to the output range."""
     if u < t.limits[OUTPUT_MIN]:
         return t.limits[OUTPUT_MIN]
     if u > t.limits[OUTPUT_MAX]:
@@ -143,7 +143,7 @@ def first_moves(
     `not_above` gives the largest number of the type that does not exceed a drive, and whether the two are equal. The
     forward operator has to know in which direction the actuator moves from the drive of the start memory, even if that
     drive is not a number of the type or lies beyond the limits. Seen from the number below it, every move has its true
-    direction if staying there counts as descending. The inverse starts at the nearest number, where it may stay.
+    direction, provided that staying counts as descending. The inverse starts at the nearest number, and may stay there.
     """
     low, high = limits
     applied: list[Scalar] = [0, 0, 0, 0]

@@ -1,5 +1,5 @@
-"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it or the same in
-double precision over sampled signals."""
+"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it, or the same
+operator in double precision, over sampled signals."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 
 class Engines(NamedTuple):
-    """One kind of arithmetic: the functions of its memoryless part, and forward and inverse operator in engine loop, in
-    engine corners without a memoryless part and with one."""
+    """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in engine
+    loop and in engine corners, there without and with a memoryless part."""
 
     front: ModuleType
     loop: tuple[Operations, Operations]
@@ -46,7 +46,7 @@ class Engines(NamedTuple):
 
 @functools.cache
 def _engines(fixed: bool) -> Engines:
-    """Those of floating point, or those of fixed point, which are imported when a model has it."""
+    """The engines of floating point, or of fixed point, which are imported only when a model needs them."""
     if not fixed:
         corners = (forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)
         return Engines(compensator, step_float.OPERATIONS, corners)
@@ -60,12 +60,12 @@ def _engines(fixed: bool) -> Engines:
 
 
 def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
-    """The module with the functions of the memoryless part, for the arithmetic of given tables."""
+    """The module with the functions of the memoryless part, in the arithmetic of the tables."""
     return _engines(t.fixed).front
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
-    """The functions of one operator in the bit reference, for the arithmetic and the engine of given tables."""
+    """The functions of one operator in the bit reference, for the arithmetic and engine of the tables."""
     fixed = t.fixed
     if isinstance(t, Tables | FixedTables):
         found = _engines(fixed)
@@ -99,19 +99,19 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
 
 
 def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
-    """Samples as the operators take them. In fixed point raises ValueError for numbers that are not codes."""
+    """Samples in the operators' type. In fixed point, raises ValueError for numbers that are not codes."""
     with np.errstate(invalid="ignore"):  # numbers that are not codes are found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     if found.dtype.kind == "f":
         return found
     most = int(t.limits[CODE_MAX])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
-        raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
+        raise ValueError(f"fixed point takes codes, integers from {-most - 1} to {most}")
     return found
 
 
 def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]:
-    """The numbers nearest to the given ones that a call takes as arguments."""
+    """The given numbers, rounded to the nearest that a call accepts as arguments."""
     if t.fixed:
         most = int(t.limits[CODE_MAX])
         x = np.clip(np.rint(x), -most - 1, most)
@@ -121,7 +121,7 @@ def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
+    """Answers and status of the bit reference for calls `call` with arguments `x`, from the start memory on."""
     code, state = operations(t, inverse), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -135,7 +135,7 @@ class Session:
     """One instance of an operator, run over consecutive records.
 
     `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
-    `clamp` is set; with one it is the bit reference of the emitted C, which clamps. `lsb`: drive and output units per
+    `clamp` is set; with it, it is the bit reference of the emitted C, which clamps. `lsb`: drive and output units per
     code in fixed point, None for the finest. Raises NotInvertibleError and FormatError.
     """
 
@@ -181,7 +181,7 @@ class Session:
         return self._range
 
     def visit(self, drives: Iterable[float]) -> None:
-        """Show the actuator these drives, in range or not, after `init` and before the next samples."""
+        """Apply these drives to the actuator, in range or not, after `init` and before the next samples."""
         seen = self._samples(list(drives))
         if not self._fixed:
             inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
@@ -204,8 +204,8 @@ class Session:
         return samples(self.tables, arguments.signal("u" if self.inverse else "v", x))
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
-        """Run a sequence of init, reset, step and commit with their arguments. Returns the answers of the steps, and
-        the status bits."""
+        """Run a sequence of init, reset, step and commit with their arguments. Returns the steps' answers and the
+        status bits."""
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
         with jit.for_samples(self._code.run, x):

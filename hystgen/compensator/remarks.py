@@ -14,13 +14,13 @@ from hystgen.compensator.reference import Session
 from hystgen.plays import slots
 
 ROUNDED = 1e-9
-"""[share of the range] A reference or drive beyond its range by at most this counts as at its end, since it is
-rounding: a converter of 29 bits has larger steps, and in double precision models and their inverses compose to 1e-12.
-Only counts depend on it. Set by: tests/test_clamped_inverse.py."""
+"""[share of the range] A reference or drive beyond its range by at most this counts as at its end, because rounding
+explains it: a 29-bit converter has larger steps, and in double precision a model undoes its inverse to within 1e-12.
+Affects only the counts. Set by: tests/test_clamped_inverse.py."""
 
 
 def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, held: int = 0) -> list[str]:
-    """Remarks on drives (N,) of a forward model: those outside its range, and the number of held ones."""
+    """Remarks on drives (N,) of a forward model: how many were outside its range, and how many samples were held."""
     with np.errstate(invalid="ignore"):
         outside = int(np.count_nonzero(np.isfinite(v) & ((v < ends[0]) | (v > ends[1]))))
     how = "limited to it" if limited else "extrapolated, not limited"
@@ -30,7 +30,7 @@ def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, he
 
 
 def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
-    """Remarks on the references of an inverse: how many were limited or held, and how many other drives were
+    """Remarks on an inverse: how many references were limited or held, and how many drives for other references were
     limited."""
     said = []
     if references:
@@ -55,8 +55,8 @@ def counted(status: slots.Bytes, bit: int) -> int:
 def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[NDArray[np.float64], list[str]]:
     """Answers (N,) of a session, and remarks on the samples.
 
-    `moved`: for an inverse in double precision, a forward session with the same memory; the count is then of references
-    that the drives miss by more than rounding. The bit reference counts by the status of the C.
+    `moved`: for an inverse in double precision, a forward session with the same memory, to count the references that
+    the drives miss by more than rounding. The bit reference counts by the status bits of the C.
     """
     answers, status = session.run(x)
     signal = arguments.signal("x", x)
@@ -70,11 +70,11 @@ def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[N
         with np.errstate(invalid="ignore"):
             missed = np.abs(signal - moved.run(answers)[0]) > ROUNDED * (high - low)
         references, drives = references & missed, drives & missed
-    drives &= ~references  # a sample counts once
+    drives &= ~references  # count each sample once
     return answers, inverse(len(signal), int(np.count_nonzero(references)), int(np.count_nonzero(drives)), held)
 
 
 def tell(said: Iterable[str], depth: int = 2) -> None:
-    """Warn with each remark; `depth`: calls between here and the user's code."""
+    """Issue each remark as a warning; `depth`: calls between here and the user's code."""
     for text in said:
         warnings.warn(text, SampleWarning, stacklevel=depth + 1)

@@ -1,10 +1,10 @@
-"""One step, and the operations around it: commit, reset, init. `operations_of` is shared by all chains, `made_of` is
-the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has chains with blocks.
+"""One step, and the operations around it: commit, reset, init. All chains share `operations_of`; `made_of` makes the
+chain without blocks (engine loop, no effects), and `hystgen.compensator.chain` has chains with blocks.
 
 Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share begin with
 `operator_` there (`hystgen_operator_begin`; emission writes one for each) and have no prefix here (`begin`). Engine
-corners without effects has its own functions in `hystgen.compensator.corners` and shares the memoryless part and the
-tables.
+corners without effects has its own functions in `hystgen.compensator.corners` and shares only the memoryless part and
+the tables.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from hystgen.plays.slots import (
 
 
 class Stepping(Protocol):
-    """The memory of a step itself, which every engine has."""
+    """Anything with the memory of the step itself, which every engine has."""
 
     @property
     def step(self) -> StepState: ...
@@ -50,7 +50,7 @@ class Branching(Limited, Protocol):
 
 class Operations(NamedTuple):
     """The operations on an instance of one operator: `init` sets the start memory, `visit` moves the actuator before
-    the next sample, `step` answers a sample, `run` makes a sequence of calls."""
+    the next sample, `step` answers a sample, `run` executes a sequence of calls."""
 
     init: Action
     visit: Action
@@ -84,7 +84,7 @@ def inverse_fits(t: Limited, s: Stepping, v: Scalar, ascending: int) -> bool:
 
 @jit(inline=True)
 def turn_to(s: Stepping, v: Scalar) -> None:
-    """Move the actuator to drive v; the direction of the move picks the branch."""
+    """Move the actuator to drive v; the direction of the move selects the branch."""
     if v > s.step.drive[0]:
         s.step.ascending[0] = 1
     elif v < s.step.drive[0]:
@@ -95,12 +95,12 @@ def turn_to(s: Stepping, v: Scalar) -> None:
 def choosing(
     front_inverse: Callable[..., tuple[N, int]]
 ) -> Callable[[Branching, Stepping, N, N], tuple[N, int]]:
-    """`inverse_choose` with the inverse of an arithmetic's memoryless part."""
+    """`inverse_choose`, for the memoryless inverse of an arithmetic."""
 
     @jit
     def inverse_choose(t: Branching, s: Stepping, level: N, w: N) -> tuple[N, int]:
-        """The drive that gives w on the branch of its own move: it tries the branch of the reference's move, then the
-        other one; if neither fits, the drive holds."""
+        """The drive that gives w on the branch of its own move: tries the branch of the reference's move, then the
+        other; if neither fits, the drive holds."""
         if not t.branches:
             return front_inverse(t, w, 1)
         up = s.step.ascending[0]
@@ -133,13 +133,13 @@ class PlayOperations(NamedTuple):
 
 
 def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer) -> PlayOperations:
-    """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
+    """The operations of plays, from the two functions of the memoryless part and `output` for the present memory."""
 
     inverse_choose = choosing(front_inverse)
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
-        """The part that init and reset share, once the plays are set; `which` as in `Tables.applied`."""
+        """The part shared by init and reset, once the plays are set; `which` as in `Tables.applied`."""
         drive = t.applied[which]
         s.step.ascending[0] = t.ascending[which]
         s.step.has_pending[0] = 0
@@ -170,7 +170,7 @@ def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer
 
     @jit(inline=True)
     def set_drive(t: Tables | FixedTables, s: State, v: Scalar) -> None:
-        """Move the actuator to drive v; with two branches, the direction of the move picks one."""
+        """Move the actuator to drive v; with two branches, the direction of the move selects one."""
         if t.branches:
             turn_to(s, v)
         s.step.drive[0] = v
@@ -200,8 +200,8 @@ class Hooks(NamedTuple):
     finite: Check
     absorb: Action
     shown: LimitedAnswer  # the present output, and status bits
-    unread: Action  # note a reference that is not finite
-    held: Answer  # the drive for it
+    unread: Action  # note that a reference is not finite
+    held: Answer  # the drive for such a reference
     stands: Check  # whether the last answer holds for a reference
     sought: Answer  # the drive for a limited reference, which may lie beyond its range; sets BITS
     other: Answer  # a call that models without effects do not have
@@ -214,8 +214,8 @@ def run_of(
 
     @jit
     def run(t: Limited, s: object, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, also for a reset;
-        status[i] is read and cleared, or 0 and left for a later call."""
+        """Run op[i] with argument x[i]. answers[i] is the call's answer, 0 if it has none and for a reset; status[i] is
+        the status, read and cleared, or 0 if it is left for a later call."""
         m = plays(s).step
         for i in range(len(op)):
             call = op[i] & OP_CALL
@@ -239,8 +239,8 @@ def run_of(
 
 
 def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forward_commit) -> Operations:
-    """The operations of one operator in engine corners without effects, whose memory is only that of the plays; `begin`
-    sets the start memory of the parameter file (0), or all plays to 0 (1)."""
+    """The operations of one operator in engine corners without effects, where the plays' memory is the whole memory;
+    `begin` sets the start memory of the parameter file (0), or all plays to 0 (1)."""
 
     @jit(inline=True)
     def init(t: Limited, m: Stepping) -> None:
@@ -267,7 +267,7 @@ def no_other(t: Limited, s: object, call: int, x: Scalar) -> Scalar:  # noqa: AR
 
 
 def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hooks: Hooks) -> Operations:
-    """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
+    """The operations of one operator on a chain; step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
@@ -317,7 +317,7 @@ def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hoo
 
     @jit
     def inverse_commit(t: Limited, s: object, applied: Scalar) -> None:
-        """Replace the last answer by the drive that was really applied."""
+        """Replace the last answer by the drive that was actually applied."""
         m = plays(s)
         if not finite(t, applied):
             m.step.status[0] |= HELD
@@ -337,19 +337,19 @@ def made_of(
     front_forward: Answer, front_inverse: LimitedAnswer, output: LimitedAnswer, inverse_solve: Answer, finite: Check
 ) -> tuple[Operations, Operations]:
     """The operations of the forward operator and the inverse of a chain without blocks, from the functions in which
-    arithmetics differ: the memoryless part, the output at the present memory with its status bits, the plays' input for
-    an output, and whether an argument is finite."""
+    arithmetics differ: the memoryless part, the output for the present memory with its status bits, the plays' input
+    for an output, and whether an argument is finite."""
 
     @jit(inline=True)
     def level_of(t: Tables | FixedTables, s: State) -> Scalar:
-        """The output at the present memory; its status is not reported, since this is no step."""
+        """The output for the present memory, without its status, since this is not a step."""
         return output(t, s)[0]
 
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, level_of)
 
     @jit(inline=True)
     def itself(s: State) -> State:
-        """The memory itself, which is only that of the plays."""
+        """The memory itself, which consists of the plays alone."""
         return s
 
     @jit(inline=True)
@@ -366,7 +366,7 @@ def made_of(
 
     @jit(inline=True)
     def unread(t: Tables | FixedTables, s: State) -> None:
-        """Do nothing: there is no line of references."""
+        """Do nothing: there is no preview line to fill."""
 
     @jit(inline=True)
     def held(t: Tables | FixedTables, s: State) -> Scalar:  # noqa: ARG001  the same call for every chain

@@ -13,7 +13,7 @@ from hystgen.plays.slots import FRACTION, OFFSET
 
 @jit
 def output(t: FixedTables, s: State) -> tuple[int, int]:
-    """Output code at the present memory, limited to the type, and its status."""
+    """Output code for the present memory, limited to the type, and its status."""
     return code(t, loop_output(t, s) + t.limits[OFFSET])
 
 

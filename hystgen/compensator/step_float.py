@@ -12,7 +12,7 @@ from hystgen.plays.slots import OFFSET, REAL_MAX
 
 @jit(inline=True)
 def output(t: Tables, s: State) -> tuple[Scalar, int]:
-    """Output at the present memory, including the offset, and its status."""
+    """Output for the present memory, including the offset, and its status."""
     return loop_output(t, s) + t.limits[OFFSET], 0
 
 

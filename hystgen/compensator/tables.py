@@ -1,6 +1,6 @@
-"""The numbers that the kernels of a model work with, in one arithmetic.
+"""The constants of a model's kernels in one arithmetic.
 
-Both the bit reference and the C text take all constants of an operator from here.
+The bit reference and the C text both take an operator's constants from here.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def build(
 
     Without `clamp`, only the (float) arithmetic limits drive and output; without `inverse` as well, the stages are not
     cut to their invertible part. `lsb`: physical units per drive code and per output code in fixed point; `visited`:
-    inputs beyond the range that the plays may see, in floating point. Raises FormatError if the model does not fit the
+    in floating point, inputs beyond the range that the plays may see. Raises FormatError if the model does not fit the
     arithmetic.
     """
     if not ARITHMETICS[arithmetic].fixed:

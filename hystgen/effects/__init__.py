@@ -1,6 +1,6 @@
 """The catalogue of effects beyond the static model: one folder per effect, with its forward model and parameters.
 
-An effect's `model` is imported when a parameter file names it, so that plain models stay quick to load.
+An effect's `model` is imported only when a parameter file names it, so that plain models load quickly.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _FIRST = (
     "sensor_nonlinearity",
     "noncongruent",
 )
-"""The order in which messages and searches name effects; any others follow by the alphabet."""
+"""The order in which messages and searches name effects; any others follow alphabetically."""
 
 
 BEND, LIMIT = "asymmetry", "saturation"
-"""Effects that a memoryless front in `model.memoryless` can have: it bends, or its ends are flatter. The first has no
-folder, the second has one for a limit behind the plays."""
+"""Names for what a memoryless front in `model.memoryless` can do: bend the curve, or flatten its ends. The first has no
+folder; the folder of the second is for a limit behind the plays."""
 
 FRONTS = BEND, LIMIT
 
 TOLD_APART = {
-    frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
+    frozenset(("creep", "drift")): "record holds of a minute after moves up and down: creep follows the last move",
     frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",
     frozenset(("lag", "resonance")): "record steps or a sweep: a resonance rings and has a peak",
     frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
@@ -55,7 +55,7 @@ TOLD_APART = {
 """Experiments that separate two effects."""
 
 Unmeasured = Literal["drift", "self_heating"]
-"""What a compensator follows open loop, where it is asked to, since nothing measures it."""
+"""What a compensator follows open loop if the user requests it, since nothing measures it."""
 
 
 def _catalogue() -> tuple[str, ...]:
@@ -64,7 +64,7 @@ def _catalogue() -> tuple[str, ...]:
 
 
 CATALOGUE = _catalogue()
-"""Names of the effects: the folders here, each with a `model` whose `SHAPES` are its classes, the default one first."""
+"""Names of the effects: the folders here, each with a `model` whose `SHAPES` are its classes, default first."""
 
 _PLACES = {
     **dict.fromkeys(("About", "Candidate", "Effect", "Place", "Run", "decays", "follow"), "base"),
@@ -85,7 +85,7 @@ def shapes(name: str) -> tuple[type[Effect], ...]:
 
 
 def load_compiled() -> None:
-    """Compile the compiled parts of all models, or read them from the cache, in this process before it forks."""
+    """Compile the compiled parts of all models, or load them from the cache, in this process before it forks."""
     from hystgen.effects import base
 
     base.load()

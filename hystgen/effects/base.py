@@ -1,7 +1,7 @@
 """The base of all effects: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
 
-Signals are straight between samples, so the filters are exact at any time steps for a piecewise straight drive. Before
-its first sample, a record has been at rest at that sample's drive.
+Signals are linear between samples, so the filters are exact for a piecewise linear drive at any time steps. Before its
+first sample, a record has been at rest at that sample's drive.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class Place(enum.Enum):
-    """Where an effect sits, in the order of the chain; within a place the effects' `order` decides."""
+    """Where an effect sits, in the order of the chain; within a place, `order` decides."""
 
     DRIVE = "drive"
     PLAYS = "plays"
@@ -42,15 +42,15 @@ USER = "user:"
 """Prefix of the names of a user's own effects."""
 
 MOST_BYTES = 2**25
-"""[bytes] Most memory for the factors that a record caches."""
+"""[bytes] Maximum memory for the factors that a record caches."""
 
 
 @dataclass(frozen=True)
 class Run:
     """One record as an effect sees it, N samples.
 
-    `t`: seconds, rising, session time; `v`: the drive as recorded; `extra`: further columns by name; `rest`: seconds of
-    pause before the first sample, at the drive before it (`chain.join` turns it into samples).
+    `t`: session time in s, rising; `v`: the drive as recorded; `extra`: further columns by name; `rest`: length in s of
+    the pause before the first sample, at the previous drive (`chain.join` turns it into samples).
     """
 
     t: Array
@@ -58,26 +58,26 @@ class Run:
     extra: Mapping[str, Array] = field(default_factory=dict)
     rest: float = 0.0
     within: tuple[Run, NDArray[np.intp]] | None = field(default=None, repr=False, compare=False)
-    """the longer run from which these samples are taken; its first and its last sample are among them"""
+    """the longer run from which these samples are taken, including its first and last samples"""
 
     def picked(self, places: NDArray[np.intp]) -> Run:
-        """The run at some of its samples; sums from sample to sample still include all of them."""
+        """The run at some of its samples; sums from sample to sample still include every sample."""
         extra = {name: column[places] for name, column in self.extra.items()}
         return Run(self.t[places], self.v[places], extra, self.rest, (self, places))
 
     @cached_property
     def steps(self) -> Array:
-        """Seconds from each sample to the next, N - 1 of them."""
+        """Seconds from each sample to the next (N - 1,)."""
         return np.diff(self.t)
 
     @cached_property
     def drive_range(self) -> float:
-        """Largest less smallest drive."""
+        """Largest minus smallest drive."""
         return float(np.ptp(self.v))
 
     @cached_property
     def travelled(self) -> Array:
-        """Distance `sum |dv|` that the drive has moved up to each sample, input units."""
+        """Distance `sum |dv|` that the drive has travelled up to each sample, input units."""
         if self.within is not None:
             whole, places = self.within
             return whole.travelled[places]
@@ -85,18 +85,18 @@ class Run:
 
     @cached_property
     def heat(self) -> Array:
-        """Mean of `|v v'|/2` from each sample to the next, N - 1 of them."""
+        """Mean of `|v v'|/2` from each sample to the next (N - 1,)."""
         if self.within is not None:
             whole, places = self.within
             return np.add.reduceat(whole.heat * whole.steps, places[:-1]) / self.steps
         return 0.5 * np.abs(np.diff(0.5 * self.v * np.abs(self.v))) / self.steps
 
     def factors(self, time_constant: float) -> Array:
-        """`decays` over the steps with a time constant, (3, N - 1)."""
+        """`decays` over the steps for a time constant, (3, N - 1)."""
         return self.remembered(time_constant, lambda: self.of_steps(lambda s: np.stack(decays(s, time_constant))))
 
     def spectrum(self, time_constants: tuple[float, ...]) -> Array:
-        """`decays` over the `different` steps with several time constants, (3, steps, time constants)."""
+        """`decays` over the `different` steps for several time constants, (3, steps, time constants)."""
 
         def make() -> Array:
             steps, _ = self.different
@@ -105,23 +105,23 @@ class Run:
         return self.remembered(time_constants, make)
 
     def of_steps(self, make: Callable[[Array], Array]) -> Array:
-        """Values for each step, (k, N - 1); steps of equal length share them."""
+        """Values for each step, (k, N - 1), computed once per step length."""
         steps, place = self.different
         return make(steps).take(place, axis=1) if len(steps) < len(place) // 2 else make(self.steps)
 
     @cached_property
     def different(self) -> tuple[Array, NDArray[np.intp]]:
-        """The distinct step lengths, and for each step the index of its own."""
+        """The distinct step lengths, and for each step the index of its length."""
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
-        """Cached values made from the steps and some numbers; a search reuses most of them."""
+        """Cached values computed from the steps and some parameters; a search reuses most of them."""
         found = self._made.pop(by, None)
         if found is None:
             found = make()
         if found.nbytes * (len(self._made) + 1) > MOST_BYTES and self._made:
             del self._made[next(iter(self._made))]
-        self._made[by] = found  # the latest one comes last
+        self._made[by] = found  # the most recent comes last
         return found
 
     @cached_property
@@ -149,24 +149,24 @@ class About:
     columns: frozenset[str] = frozenset()
     """further columns that every record has"""
     ringing: tuple[float, ...] = ()
-    """frequencies at which the error so far has narrow peaks of its own, Hz, the strongest first"""
+    """frequencies in Hz at which the error so far has narrow peaks, strongest first"""
     timed: bool = True
-    """whether the times of the records are known"""
+    """whether the records' times are known"""
     output: tuple[float, float] = (0.0, 0.0)
     """least and largest measured output of all records"""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One shape of an effect to try in a fit: free numbers within bounds, and the effect that they make.
+    """One shape of an effect to try in a fit: free parameters within bounds, and the effect that they make.
 
-    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which the effect does
-    nothing; `others`: further starts, where the error may have several minima; `beyond`: label of a simpler shape that
-    this one contains; unless that one helps, this one is not tried; `grown`: makes a start from the simpler shape's
-    numbers; `amounts`: indices of numbers that scale the effect; a search finds these first from every start, since at
-    a wrong amount the other numbers mean little; `levels_off`: index of the logarithm of a time constant, and its
-    largest value at which the records show the effect level off. Beyond it the effect only grows, and so may
-    disturbances: it is not named.
+    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: parameters at which the effect does
+    nothing; `others`: further starts, in case the error has several minima; `beyond`: label of a simpler shape that
+    this shape contains, which is not tried unless the simpler one helps; `grown`: makes a start from the simpler
+    shape's parameters; `amounts`: indices of parameters that scale the effect, which a search finds first from every
+    start, since at a wrong amount the other parameters mean little; `levels_off`: index of the logarithm of a time
+    constant, and its largest value at which the records show the effect level off. Above that the effect only grows
+    within the records, as a disturbance may, so it is not named.
     """
 
     label: str
@@ -182,17 +182,17 @@ class Candidate:
     levels_off: tuple[int, float] | None = None
 
     def at(self, numbers: Array) -> Candidate:
-        """The same shape with all numbers but the amounts fixed at the given ones."""
+        """The same shape with all parameters except the amounts fixed at the given values."""
         free = np.isin(np.arange(len(numbers)), self.amounts)
         return replace(self, low=np.where(free, self.low, numbers), high=np.where(free, self.high, numbers))
 
 
 Problem = tuple[tuple[str | int, ...], str]
-"""An inconsistency of an effect: its keys, and a message."""
+"""An inconsistency in an effect: the keys concerned, and a message."""
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-    """The problem of an effect that needs plays with a threshold, in a model without any."""
+    """The problem of an effect that needs plays with a threshold, if the model has none."""
     if thresholds is not None and len(thresholds) < 2:
         yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
@@ -200,14 +200,14 @@ def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
 def not_one_a_play(
     key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
 ) -> Iterator[Problem]:
-    """The problem of a key that does not have one of `what` per play with a threshold."""
+    """The problem of a key that does not have one of `what` for each play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
         counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
 
 
 def not_as_many(key: str, values: Sequence[object], other: str, others: Sequence[object]) -> Iterator[Problem]:
-    """The problem of a key that does not have as many values as another."""
+    """The problem of a key that does not have as many values as another key."""
     if len(values) != len(others):
         yield (key,), f"has {counted(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
 
@@ -218,7 +218,7 @@ Compensated = Literal[
 
 
 class Effect(BaseModel):
-    """An effect with its parameters; a subclass has a `place`, a method of that place and the keys of the YAML entry.
+    """An effect with its parameters; a subclass defines a `place`, a method of that place and the YAML entry's keys.
 
     A method that is not overridden leaves its signal unchanged.
     """
@@ -231,48 +231,48 @@ class Effect(BaseModel):
     selector: ClassVar[str] = "shape"
     """key that distinguishes the shapes of one name"""
     repeatable: ClassVar[bool] = False
-    """whether a model may have several of this name"""
+    """whether a model may have several effects of this name"""
     timed: ClassVar[bool] = True
     """whether the times of the samples matter"""
     pointwise: ClassVar[bool] = False
-    """whether the answer of `bent` or `mapped` depends only on the sample itself, not on the run"""
+    """whether the result of `bent` or `mapped` depends only on the sample itself, not on the run"""
     slews: ClassVar[bool] = False
-    """whether it limits the rate of the drive, to its numbers `rate` and `falling_rate`"""
+    """whether it limits the rate of the drive, to its parameters `rate` and `falling_rate`"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     fades: ClassVar[bool] = False
     """whether a pause before a record with a known history brings its start state to rest"""
     settled: ClassVar[tuple[str, ...]] = ()
-    """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
+    """keys that a refit leaves unchanged: conventions, and parameters that a fit cannot separate from others"""
     later: ClassVar[tuple[str, ...]] = ()
-    """keys added after the first files were written: left out of files, and of the hash, at their defaults"""
+    """keys added after the first files were written: at their defaults, files and the hash leave them out"""
     hint: ClassVar[str] = ""
     """suggestion printed with an error about a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"
-    """how far a compensator can take the effect out"""
+    """how well a compensator can compensate the effect"""
     compensation: ClassVar[str] = ""
-    """how, one clause"""
+    """how it does so, in one clause"""
     mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {}
-    """doubts about an inverse where records could not tell the effect from another fault: by the name of that one, if
-    it was taken, and if this effect was"""
+    """warnings about an inverse where records could not tell the effect from another one: by the name of the other, in
+    case the other was chosen, and in case this effect was"""
     shown_by: ClassVar[Mapping[str, int]] = {}
-    """records of a plan that show it, and its place among the effects that a record shows, 1 for the plainest"""
+    """planned records that show it, and its rank among the effects that each record shows, 1 for the most visible"""
     rank: ClassVar[float] = math.inf
-    """order of effects that explain records equally well: a lag or a delay, which every drive has, before late plays"""
+    """order of effects that explain records equally well: a lag or delay, which every drive has, before late plays"""
     from_start: ClassVar[bool] = False
-    """whether it counts the seconds from the first sample"""
+    """whether it depends on the time since the first sample"""
     block: ClassVar[OwnBlock | None] = None
-    """compensator of a user's own effect; the catalogue's compensators are in their folders"""
+    """compensator of a user's own effect; those of the catalogue are in their effects' folders"""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: object) -> None:
-        """Guard a user's own effect, which may fail or return anything."""
+        """Guard the methods of a user's own effect, which may fail or return anything."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
             guarded.guard(cls, Effect, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """Contradictions between parameters, as (keys, message); `thresholds` of the model, None where not known."""
+        """Contradictions between parameters, as (keys, message); `thresholds`: of the model, None if unknown."""
         yield from ()
 
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
@@ -281,16 +281,16 @@ class Effect(BaseModel):
 
     @property
     def dead_time(self) -> float:
-        """DRIVE: seconds before a change of the drive shows at all."""
+        """DRIVE: time in s before a change of the drive has any effect."""
         return 0.0
 
     def corrected(self, resonance: str) -> str:
-        """How a compensator takes the effect out, one clause; `resonance`: what `emit.compensation.resonance` says."""
+        """How a compensator compensates the effect, in one clause; `resonance`: `emit.compensation.resonance`."""
         return self.compensation
 
     def time_scale(self, drive_range: float) -> float:
-        """Longest time constant in s, or duration of a move over the drive's range; 0 for an effect without either, inf
-        for one that never ends."""
+        """Longest time constant, or duration of a move over the drive's range, in s; 0 for an effect without either,
+        inf for an effect that never ends."""
         return 0.0
 
     def drive(self, a: Array, run: Run) -> Array:
@@ -298,12 +298,12 @@ class Effect(BaseModel):
         return a
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """PLAYS: how the plays move, rows (n+1, N) for their input `w` (N,); one effect of a model may override it."""
+        """PLAYS: the moving plays, rows (n+1, N) for their input `w` (N,); one effect per model may override it."""
         return operators.plays(w, thresholds, start)
 
     @classmethod
     def moves_plays(cls) -> bool:
-        """Whether the effect determines how the plays move."""
+        """Whether the effect sets how the plays move."""
         return cls.plays is not Effect.plays
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
@@ -316,7 +316,7 @@ class Effect(BaseModel):
         return cls.bent is not Effect.bent
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
-        """PLAYS: the plays' rows (n+1, N) as the weights sum them."""
+        """PLAYS: the plays' rows (n+1, N) in the form in which the weights sum them."""
         return rows
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
@@ -324,7 +324,7 @@ class Effect(BaseModel):
         return np.asarray(p @ self.bent(rows, thresholds))
 
     def filtered(self, h: Array, run: Run) -> Array:
-        """LINEAR: every row of `h`, (N,) or (k, N), filtered by itself, from rest at its first sample."""
+        """LINEAR: every row of `h`, (N,) or (k, N), filtered separately, from rest at its first sample."""
         return h
 
     def gain(self, run: Run) -> Array:
@@ -344,7 +344,7 @@ class Effect(BaseModel):
         return np.zeros(len(run.t))
 
     def transients(self, run: Run) -> Array:
-        """Responses (k, N) to an unknown start state, which a fit may add to a record with free factors."""
+        """Responses (k, N) to an unknown start state, which a fit may add to a record, each with a free factor."""
         return np.empty((0, len(run.t)))
 
     def largest(self, run: Run) -> Array:
@@ -352,7 +352,7 @@ class Effect(BaseModel):
         return np.full(len(self.transients(run)), np.inf)
 
     def numbers(self, seconds: float) -> Sequence[float]:
-        """The numbers of the `block`'s table at steps of `seconds`."""
+        """The parameters of the `block`'s table at steps of `seconds`."""
         return ()
 
     @classmethod
@@ -364,18 +364,18 @@ class Effect(BaseModel):
 class Block(ABC):
     """One block of a compensator in double precision, one sample at a time, at steps of any length in s.
 
-    A compensator solves backwards from the output, which moves nothing, and absorbs the applied drive forwards, so that
-    its memory holds only what the actuator has seen.
+    A compensator solves backwards from the output, which moves nothing, and absorbs the applied drive forwards, so its
+    memory holds only what the actuator has seen.
     """
 
     @abstractmethod
     def advance(self, seconds: float, later: float | None = None) -> None:
-        """Set the time to the next sample, and the time from there to the one after it, `later`; None: the same again.
-        For the first sample, at which everything rests, both are the time that follows it."""
+        """Advance by `seconds` to the next sample; `later`: time from there to the following sample, None: the same.
+        For the first sample, at which everything is at rest, both are the time that follows it."""
 
     @abstractmethod
     def call(self, verb: str, x: float) -> float:
-        """The result of one of the verbs below for x."""
+        """The result of a verb below for x."""
 
     def resting(self, y: float) -> float:
         """The input that gives the output `y` once everything has settled."""
@@ -390,18 +390,18 @@ class Block(ABC):
         return self.call("solve", y)
 
     def absorb(self, x: float) -> float:
-        """The input is `x` at this sample; returns the output."""
+        """Absorb the input `x` at this sample; returns the output."""
         return self.call("absorb", x)
 
 
 def span(low: float, high: float) -> tuple[float, float]:
-    """Decimal logarithms of the ends of a range of positive numbers; never empty."""
+    """Decimal logarithms of the ends of a range of positive numbers; the range is never empty."""
     low = max(low, 1e-12)
     return math.log10(low), math.log10(max(high, 2.0 * low))
 
 
 def from_zero(grain: float, most: float, start: float) -> tuple[Array, Array, Array, Callable[[float], float]]:
-    """Bounds and start of a coordinate x >= 0 with value `grain (10^x - 1)`: even over orders of magnitude, with 0."""
+    """Bounds and start of a coordinate x >= 0 with value `grain (10^x - 1)`: logarithmic, but including 0."""
 
     def value(x: float) -> float:
         return grain * math.expm1(x * math.log(10.0))
@@ -414,10 +414,10 @@ def from_zero(grain: float, most: float, start: float) -> tuple[Array, Array, Ar
 
 
 def decays(steps: Array, time_constant: float) -> tuple[Array, Array, Array]:
-    """Factors of `x' = (u - x)/tau` over time steps with straight `u`: `x_1 = E x_0 + b_0 u_0 + b_1 u_1`.
+    """Factors of `x' = (u - x)/tau` over time steps with linear `u`: `x_1 = E x_0 + b_0 u_0 + b_1 u_1`.
 
     With `s = dt/tau`: `E = exp(-s)`, `b_0 = (1 - E)/s - E`, `b_1 = 1 - (1 - E)/s` (first-order hold, exact). A time
-    constant of 0 passes `u`.
+    constant of 0 passes `u` unchanged.
     """
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         s = steps / time_constant if time_constant > 0.0 else np.full(len(steps), np.inf)
@@ -452,7 +452,7 @@ def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Arr
 
 
 def load() -> None:
-    """Compile these functions, or read them from the cache, on two samples."""
+    """Compile these functions, or load them from the cache, by running them on two samples."""
     u, step, out = np.arange(2.0), np.ones(1), np.empty(2)
     follow(u, step, step, step, 0.0, out)
     curve(u, 1.0, step, 1.0, out)

@@ -27,11 +27,11 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
     "added": lambda run: run.t.shape,
     "transients": lambda run: (-1, len(run.t)),
 }
-"""Shape of the array that each method returns, by its arguments; -1 stands for any number."""
+"""Shape of the array that each method returns for its arguments; -1 stands for any length."""
 
 
 def guard(effect: type[Any], base: type[E], name: str) -> None:
-    """Make the methods of a class, and of its bases below `base`, raise EffectsError where they fail."""
+    """Make the methods of a class, and of its bases below `base`, raise EffectsError when they fail."""
     own: dict[str, Any] = {}
     for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
         own.update(vars(each))
@@ -88,7 +88,7 @@ def _candidate(each: Any, cls: type[E], name: str) -> Any:
     low, _, high = vectors[:3]
     if low.ndim != 1 or any(x.shape != low.shape or not np.isfinite(x).all() for x in vectors) or np.any(low > high):
         raise EffectsError(
-            f"the effect {name} has a candidate {each.label!r} whose low, start, high and others are not finite lists "
+            f"the effect {name} has a candidate {each.label!r} whose low, start, high and others must be finite lists "
             "of one length, low below high"
         )
     build(vectors[1])

@@ -1,4 +1,4 @@
-"""The kinds of a compensator's blocks: names of their numbers, and their verbs, the same in Python and in C."""
+"""The kinds of a compensator's blocks: names of their parameters and states, and verbs, the same in Python and in C."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ VERBS = ("rest", "resting", "solve", "absorb")
 
 @dataclass(frozen=True)
 class Rows:
-    """The repeated entries of a block: an entry's name, its numbers, and its memory if it has any."""
+    """The repeated entries of a block: an entry's name, its constants, and its memory if it has any."""
 
     name: str
     table: type[Struct]
@@ -31,10 +31,10 @@ class Rows:
 class Kind:
     """One kind of block in one arithmetic.
 
-    `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, which follow a pointer to `rows`
-    in C if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it has;
-    without `rest` it settles as it absorbs, without `resting` it rests as it solves; `like`: the kind whose table type
-    it shares.
+    `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, in C preceded by a pointer to its
+    `rows` if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it has;
+    without `rest`, absorb also settles it, without `resting`, solve also serves at rest; `like`: the kind whose table
+    type it shares.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Kind:
 
     @property
     def tabled(self) -> str:
-        """Name of the kind that its table type is named after."""
+        """The kind after which its table type is named."""
         return self.like or self.name
 
     def verb(self, asked: str) -> str:
@@ -57,9 +57,8 @@ class Kind:
 
 @dataclass(frozen=True)
 class Constants:
-    """The numbers of one block: its table, a record with the members of `kind.table`, and its rows (m,); `products`:
-    multiplications in absorb and in solve; `bits`: fraction bits of its signals beyond the chain's, if it computes with
-    finer ones."""
+    """The constants of one block: its table, a record with the members of `kind.table`, and its rows (m,); `products`:
+    multiplications in absorb and in solve; `bits`: fraction bits of its signals beyond the chain's, if finer."""
 
     kind: Kind
     table: Any
@@ -69,8 +68,8 @@ class Constants:
 
 
 def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
-    """What gives the constants of all blocks of a kind from their tables. Their verbs take `absorb` and `solve`
-    products, `absorb` takes `each` more for each row, and two for each Newton step for the reciprocal of a gain."""
+    """A function that returns the constants of all blocks of a kind from their tables. Their verbs take `absorb` and
+    `solve` products; absorb takes `each` more per row, and two per Newton step for the reciprocal of a gain."""
 
     def constants(t: Any) -> Iterator[Constants]:
         for j, row in enumerate(t if isinstance(t, Struct) else t.block):
@@ -82,7 +81,7 @@ def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable
 
 
 def product(number: Any, x: Any) -> Any:
-    """A number of a block's table times x, in a user's own block; in C it is `hystgen_product(&t->number, x)`."""
+    """A table entry times x in a user's own block; in C, `hystgen_product(&t->number, x)`."""
     return number * x
 
 
@@ -90,8 +89,8 @@ def product(number: Any, x: Any) -> Any:
 class OwnBlock:
     """The compensator of an effect; see `hystgen.effects.own`.
 
-    `source`: the C file, beside the Python file; `table`, `state`: names of the numbers of `t` and `s`, in their order.
-    The effect's method `numbers(seconds)` gives `t` for steps of that length.
+    `source`: the C file, next to the Python file; `table`, `state`: names of the entries of `t` and `s`, in order. The
+    effect's method `numbers(seconds)` returns `t` for steps of that length.
     """
 
     source: str
@@ -103,7 +102,7 @@ class OwnBlock:
     absorb: Callable[..., Any]
 
     def compiled(self, verb: str, arithmetic: Answer) -> Jit[..., Scalar]:
-        """A function for the bit reference, with the product of an arithmetic in place of `product`."""
+        """A function for the bit reference, with the product of an arithmetic replacing `product`."""
         function = getattr(self, verb)
         names = function.__globals__
         replaced = {name: arithmetic for name, value in names.items() if value is product}
@@ -118,7 +117,7 @@ class OwnBlock:
         return _products(self.absorb), _products(self.solve)
 
     def verbs(self) -> Iterator[tuple[str, Answer]]:
-        """Names and functions."""
+        """Names and functions of the verbs."""
         return ((verb, getattr(self, verb)) for verb in VERBS)
 
 

@@ -1,5 +1,5 @@
 """Memoryless maps of the output, behind everything with a memory: what such an effect tells a compensator, and its
-functions in fixed point, curves of polynomials and straight pieces."""
+functions in fixed point, curves made of polynomials or linear pieces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
 
 class MapErrors(NamedTuple):
     """Errors of maps from the last one on: the ends of the output in front of them, the slope of their inverse there,
-    the error of that inverse as one of its result, and that of the maps."""
+    the error of that inverse in terms of its result, and the error of the maps."""
 
     ends: Array
     slope: float
@@ -34,7 +34,7 @@ class FittedCurve(Protocol):
 
 
 class Wanted(NamedTuple):
-    """A curve to be fitted in fixed point, in output codes: function, ends of its argument, and largest value."""
+    """A curve to be fitted in fixed point, in output codes: function, ends of its argument, largest value."""
 
     function: Callable[[float], float]
     low: float
@@ -43,7 +43,7 @@ class Wanted(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """Units in fixed point: of a signal in output codes, of an output code, and the largest output in codes."""
+    """Units in fixed point: of a signal, in output codes, and of an output code; and the largest output, in codes."""
 
     signal: float
     lsb: float
@@ -51,8 +51,8 @@ class Whole(NamedTuple):
 
 
 class Map:
-    """An effect that maps the output: between two ends nothing changes, and beyond them there is another slope, unless
-    a subclass says otherwise. Sizes in fixed point are in output codes of `lsb`."""
+    """An effect that maps the output: between two ends nothing changes, and beyond them the slope differs, unless a
+    subclass overrides that. Sizes in fixed point are in output codes of `lsb`."""
 
     def __init__(self, effect: Effect, lower: float = 0.0, upper: float = 0.0, give: float = 0.0) -> None:
         self.effect, self.lower, self.upper, self.give = effect, lower, upper, give
@@ -62,7 +62,7 @@ class Map:
         return self.effect.mapped(y, Run(y, y))
 
     def undone(self, y: Array) -> Array:
-        """The input (N,) that gives the output `y` (N,); for an output out of reach, of the nearest within reach."""
+        """The input (N,) that gives the output `y` (N,), or the nearest output within reach."""
         inside = np.clip(y, self.lower, self.upper)
         return inside if self.give == 0.0 else np.asarray(inside + (y - inside) / self.give)
 
@@ -73,24 +73,24 @@ class Map:
         return DEAD_ZONE, 2, [*ends, *ends, *anchors, *anchors, give, 1.0, give, over, 1.0, over]
 
     def errors(self, found: MapErrors, u: float, kind: str) -> MapErrors:
-        """Those of the maps behind it and of this one, in floating point with roundings `u`."""
+        """The errors `found` of the maps behind it plus those of this map, in floating point with unit roundoff `u`."""
         size, give = float(np.max(np.abs(found.ends))), self.give
         slope = found.slope / (give if 0.0 < give < 1.0 else 1.0)
         return MapErrors(found.ends, slope, found.back + 8.0 * u * size * slope, found.there + 8.0 * u * size)
 
     def grown(self, size: float, lsb: float) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size
 
     def asked(
         self, back: float, ends: tuple[float, float], still: float, lsb: float
     ) -> tuple[float, tuple[float, float] | None]:
-        """Largest input to which an output within `back` is inverted, and the least and largest one if a curve does
-        that; `ends`: of the settled input, `still`: the largest one."""
+        """Largest input that an output of magnitude up to `back` gives, and the least and largest if a curve inverts;
+        `ends`: of the settled input, `still`: its largest magnitude."""
         return back / self.give if self.give else max(abs(self.lower), abs(self.upper)) / lsb, None
 
     def curves(self, size: float, ends: tuple[float, float] | None, lsb: float) -> list[Wanted]:
-        """Its curve for inputs within a size, and that of its inverse for results within `ends`, if it has any."""
+        """Its curve for inputs up to `size`, and that of its inverse for results within `ends`, if it has curves."""
         return []
 
     def whole_errors(self, found: MapErrors, curves: Sequence[FittedCurve], unit: Whole) -> MapErrors:
@@ -107,7 +107,7 @@ class Map:
 
 @dataclass(frozen=True)
 class MapPart:
-    """Effects that map the output: `takes` tells whether an effect is one, and `of` makes its map."""
+    """Effects that map the output: `takes` tells whether an effect is such an effect, and `of` makes its map."""
 
     takes: Callable[[Effect], bool]
     of: Callable[..., Map]
@@ -121,8 +121,8 @@ LOWER, UPPER, GIVE, INVERSE_GIVE = 0, 1, 2, 4
 class MapTables(NamedTuple):
     """All maps, in order from the plays.
 
-    `kind` (k,): TANH for a curve, or DEAD_ZONE for straight pieces; `piece` (k, 6): for straight pieces, the ends
-    between which nothing changes, the slope beyond them and 1 over it, as factors. `bends`: two curves for each k,
+    `kind` (k,): TANH for a curve, or DEAD_ZONE for linear pieces; `piece` (k, 6): for linear pieces, the ends between
+    which nothing changes, and the slope beyond them and its reciprocal, as factors. `bends`: two curves for each map,
     forward and inverse.
     """
 
@@ -154,7 +154,7 @@ def straight(t: MapTables, j: int, x: int, slope: int) -> int:
 
 @jit
 def maps_forward(t: MapTables, x: int) -> int:
-    """x behind all maps."""
+    """The output of all maps for x."""
     y = x
     for j in range(len(t.kind)):
         if t.kind[j] == TANH:

@@ -5,9 +5,9 @@
     def solve(t, s, y): ...     the input that gives the output y at this sample
     def absorb(t, s, x): ...    the input is x at this sample; returns the output
 
-`t` are the block's numbers and `s` is its memory, arrays that these functions index. They run unchanged in double
-precision, and compiled as the bit reference of the C in each arithmetic; so they use only +, - and `product(t[..],
-..)`: a literal would have another precision than the C.
+`t` holds the block's parameters, `s` its memory, arrays that these functions index. They run unchanged in double
+precision, and compiled as the bit reference of the C in each arithmetic, so they use only +, - and `product(t[..],
+..)`: a literal would not have the precision of the C.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from hystgen.effects.base import USER, Array, Block, Effect, Place
 from hystgen.effects.kinds import Kind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
-"""How many arguments each function takes."""
+"""Number of arguments of each function."""
 
 NAME = re.compile(r"user:([a-z][a-z0-9_]{0,30})")
-"""Names of effects whose block can be called after them in C."""
+"""Names of effects after which a block can be named in C."""
 
 WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
-"""Names of a block's numbers, which are also their names in C."""
+"""Names of a block's parameters and states, which are also their names in C."""
 
 
 @functools.cache
@@ -58,18 +58,18 @@ def source(effect: type[Effect]) -> Path:
 
 
 def _file(effect: type[Effect]) -> str:
-    """The Python file of an effect; `model.py` if it has none."""
+    """The Python file of an effect; `model.py` if it is unknown."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
 
 
 def origin(effect: type[Effect]) -> str:
-    """The argument of `--effects` for an effect: the last part of the folder's or file's name."""
+    """The argument of `--effects` for an effect: the last component of the folder's or file's path."""
     file = Path(_file(effect))
     return file.parent.name if file.name == "model.py" else file.name
 
 
 def numbers(effect: Effect, seconds: float) -> Array:
-    """The numbers of an effect's block at steps of `seconds`. Raises EffectsError for wrong ones."""
+    """The parameters of an effect's block at steps of `seconds`. Raises EffectsError if they are wrong."""
     assert effect.block is not None
     try:
         found = np.asarray(effect.numbers(seconds), dtype=np.float64)
@@ -89,7 +89,7 @@ def _failed(effect: Effect, function: str, error: Exception) -> EffectsError:
 
 
 class Instance(Block):
-    """The block of a user's own effect in double precision; it caches the numbers of a step length."""
+    """The block of a user's own effect in double precision; it caches the parameters of a step length."""
 
     def __init__(self, effect: Effect) -> None:
         assert effect.block is not None
@@ -99,7 +99,7 @@ class Instance(Block):
         self.advance(1.0)  # at rest the length of a step does not matter
 
     def advance(self, seconds: float, later: float | None = None) -> None:
-        """The numbers of this step."""
+        """Set the parameters for this step."""
         self.table = self._numbers(seconds)
 
     def call(self, verb: str, x: float) -> float:
@@ -119,7 +119,7 @@ def _name(effect: type[Effect]) -> str:
 
 
 def problem(effect: type[Effect]) -> str:
-    """Why the block of a class cannot be used, or nothing."""
+    """Why the block of a class cannot be used; empty if it can."""
     block = effect.block
     if block is None:
         return ""
@@ -128,20 +128,20 @@ def problem(effect: type[Effect]) -> str:
     if _name(effect).startswith(USER) and not NAME.fullmatch(_name(effect)):
         return f"has a block, and {_name(effect)} cannot name it in C; write user: and lower-case letters, digits and _"
     if effect.place is not Place.DRIVE and (effect.place, effect.order) != (Place.LINEAR, 0):
-        return "has a block, which has its place among Place.DRIVE or Place.LINEAR with order 0"
+        return "has a block, which needs place Place.DRIVE, or Place.LINEAR with order 0"
     words = [*block.table, *block.state]
     wrong = [word for word in words if not WORD.fullmatch(word) or word in KEYWORDS]
     twice = [word for names in (block.table, block.state) for word in names if names.count(word) > 1]
     if wrong or twice or not block.table or not block.state:
         return f"has {(wrong + twice + ['no'])[0]!r} among the names of its table and state; give each once, as C names"
     if not re.fullmatch(r"[A-Za-z0-9_]+\.c", str(block.source)):
-        return f"has {block.source!r} as its C file; give the name of one that lies beside the Python file"
+        return f"has {block.source!r} as its C file; give the name of a file next to the Python file"
     return ""
 
 
 @functools.cache
 def check(effect: type[Effect]) -> None:
-    """Raise EffectsError where a class's block cannot be its C's bit reference, one line `FILE:LINE: what; do` each."""
+    """Raise EffectsError, one line `FILE:LINE: what; do` a fault, if a block cannot be the bit reference of its C."""
     assert effect.block is not None
     if wrong := problem(effect):
         raise EffectsError(f"the effect {_name(effect)} {wrong}")
@@ -162,7 +162,7 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
         file = inspect.getsourcefile(function)
         tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
     except (OSError, TypeError, SyntaxError):
-        yield f"{verb} has no source that can be read; write it as a function of the file"
+        yield f"{verb} has no readable source; write it as a function in the file"
         return
     if not isinstance(tree, ast.FunctionDef) or len(tree.args.args) != ARGUMENTS[verb]:
         yield f"{file}:{first}: {verb} has to be a function of {ARGUMENTS[verb]} arguments"
@@ -184,12 +184,12 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
         named = isinstance(node, ast.Name) and isinstance(known.get(node.id), int | float)
         if isinstance(node, ast.Constant) or named:
             what = ast.unparse(node)
-            yield f"{place}: the number {what} in {verb} is of another precision than the C's; put it in the table"
+            yield f"{place}: the number {what} in {verb} does not have the precision of the C; put it in the table"
         elif called is product:
             if not _of_table(node, tree.args.args[0].arg):
-                yield f"{place}: {verb} has {ast.unparse(node)}; give a number of the table first, product(t[..], ..)"
+                yield f"{place}: {verb} has {ast.unparse(node)}; give a table entry first, product(t[..], ..)"
         elif isinstance(node, ast.operator):
-            continue  # the message about its operation names it
+            continue  # the message about its operation includes it
         elif (
             not isinstance(node, ALLOWED)
             or (isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Add | ast.Sub))
@@ -202,11 +202,11 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
 
 
 def _called(node: ast.AST) -> str:
-    """The name of the function that a call names, or nothing."""
+    """The name of the function that is called; empty if the call has none."""
     return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
 
 
 def _of_table(call: Any, t: str) -> bool:
-    """Whether the first of two factors is a number of the table `t`."""
+    """Whether the first of two factors is an entry of the table `t`."""
     first = call.args[0] if len(call.args) == 2 and not call.keywords else None
     return isinstance(first, ast.Subscript) and isinstance(first.value, ast.Name) and first.value.id == t

@@ -21,10 +21,10 @@ Function = Callable[..., Any]
 
 
 class Led(NamedTuple):
-    """How to lead the only block in front of the plays where the blocks behind it depend on its way: its state, the
-    input for an output, the input that is kept, the output of an input, the shortfall of a move in its first sample;
-    and the input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in
-    fixed point among numbers up to `coarse`."""
+    """How to lead the only block in front of the plays if the blocks behind it depend on its path: its state, the input
+    for an output, the input that is kept, absorbing an input, the shortfall of a move in its first sample; and the
+    input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in fixed point
+    among numbers up to `coarse`."""
 
     state: Answer
     solve: Callable[..., tuple[Scalar, Scalar]]
@@ -38,10 +38,10 @@ class Led(NamedTuple):
 
 @runtime_checkable
 class Leading(Protocol):
-    """The block that `Led` leads, in double precision. `rises`: the direction of arrival, where two branches follow;
-    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step; `patience`:
-    share of the way to the other branch that it falls short in the first sample of a turn; `braked`: the drive at which
-    it does not overshoot, from the nearest in reach, `short` of the answer."""
+    """The block that `Led` leads, in double precision. `rises`: the direction of arrival, in front of two branches;
+    with `always_led` it is then led however short a step is; `exact`: whether it is inverted exactly in this step;
+    `patience`: the share of the distance to the other branch by which it falls short in the first sample of a turn;
+    `braked`: the drive at which it does not overshoot, from the nearest reachable drive, `short` of the answer."""
 
     rises: Callable[[], bool] | None
     always_led: bool
@@ -53,8 +53,8 @@ class Leading(Protocol):
 
 
 class Following(Protocol):
-    """A gain behind the plays that follows the drive, in double precision at steps of any length: the input that gives
-    the output y if the drive goes from `before` to `drive`, and that it has gone there; NaN before the first sample."""
+    """A gain behind the plays that depends on the drive, in double precision at steps of any length. `solve`: the input
+    that gives output y if the drive goes from `before` (NaN at the first sample) to `drive`; `move`: it has done so."""
 
     def solve(self, y: float, before: float, drive: float, seconds: float) -> float: ...
     def move(self, before: float, drive: float, seconds: float) -> None: ...
@@ -63,16 +63,16 @@ class Following(Protocol):
 @dataclass(frozen=True)
 class Verbs:
     """The functions of one kind of block in one arithmetic; arguments: tables and memory of all blocks, the index of a
-    block, and numbers. The chain calls the functions that a kind has.
+    block, and numbers. The chain calls those functions that a kind has.
 
-    `memory`: made for tables and a dtype; `rest`, `absorb`, `resting`, `solve`: for a block that passes signals;
-    without `rest` it settles as it absorbs, without `resting` it rests as it solves.
+    `memory`: for given tables and dtype; `rest`, `absorb`, `resting`, `solve`: for a block that passes signals;
+    without `rest`, absorb also settles it, without `resting`, solve also serves at rest.
 
     `reset`: to the parameter file's state; `move`: the drive has moved from one value to another in one sample;
     `set_*`: set a number from the caller, and return whether it had to be limited; `travelled`: the travel, from the
-    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag whether one
-    came before; `ahead`: addition to the displacement at the newest reference's time; flags: whether there is one, and
-    whether the drive has moved. `led`: for a block in front of the plays that may be led.
+    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag whether it is
+    not the first; `ahead`: addition to the displacement at the newest reference's time, with flags whether there is a
+    reference, and whether the drive has moved. `led`: for a block in front of the plays that may be led.
     """
 
     memory: Callable[..., object]
@@ -99,8 +99,8 @@ class Verbs:
 
 
 class Margin(NamedTuple):
-    """How far sizes of signals reach beyond those without rounding: a factor, and the `span` of the output, beyond
-    which no block adds anything; `turning`: blocks behind one in front of the plays depend on its direction."""
+    """How far signals can exceed their size without rounding: a factor, and the `span` of the output, beyond which no
+    block adds anything; `turning`: blocks behind the led block depend on its direction."""
 
     slack: float
     span: float = 0.0
@@ -119,7 +119,7 @@ class Responses(NamedTuple):
 
 
 class Speed(NamedTuple):
-    """How fast a drive within `ends` moves: by at most `step` in a step of `seconds`."""
+    """How fast a drive within `ends` moves: by at most `step` in each step of `seconds`."""
 
     ends: tuple[float, float]
     step: float
@@ -127,8 +127,8 @@ class Speed(NamedTuple):
 
 
 class Gained(NamedTuple):
-    """A gain behind the plays: its own roundings, its ends, and its additions to the errors of its output (`there`) and
-    of the output asked for (`back`)."""
+    """A gain behind the plays: its own roundings, its least and largest values, and what it adds to the errors of its
+    output (`there`) and of the requested output (`back`)."""
 
     roundings: float
     least: float
@@ -138,7 +138,7 @@ class Gained(NamedTuple):
 
 
 class Arithmetical(Protocol):
-    """A model's tables, which tell their kind of arithmetic."""
+    """A model's tables, which know their kind of arithmetic."""
 
     @property
     def fixed(self) -> bool: ...
@@ -149,7 +149,7 @@ class One:
 
     @property
     def growth(self) -> float:
-        """Largest output for inputs within 1."""
+        """Largest output for inputs of magnitude at most 1."""
         return 1.0
 
     @property
@@ -163,7 +163,7 @@ class One:
         return False
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the inverse."""
+        """Roundings of the output for inputs up to `size`, and of the inverse."""
         return 0.0, 0.0
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
@@ -171,11 +171,11 @@ class One:
         return error
 
     def seen(self) -> float:
-        """Factor by which states that follow the input multiply an error of the input."""
+        """Factor by which states that follow the input amplify an error of the input."""
         return 1.0
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """The block's properties as a gain, for outputs within a size; `emitted`: with the approximations of the C."""
+        """The block's properties as a gain, for outputs up to `output`; `emitted`: with the approximations of the C."""
         return Gained(0.0, 1.0, 1.0, 0.0, 0.0)
 
     def at_rest(self, x: float) -> float:
@@ -189,16 +189,16 @@ class One:
 
     @property
     def room(self) -> float:
-        """The same gain, for intermediate results."""
+        """Largest gain up to its intermediate results."""
         return self.lead
 
     @property
     def fineness(self) -> float:
-        """Bits of a signal in front of the plays that its lead costs, 0 for none."""
+        """Bits of accuracy that its lead costs a signal in front of the plays, 0 for none."""
         return 0.0
 
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
-        """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
+        """Largest move of a drive within `ends` that may be repeated in every step; `span`: of the output."""
         return math.inf
 
     @property
@@ -211,17 +211,17 @@ class One:
         return found
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
+        """Largest answer of the inverse for outputs up to `asked`, after inputs up to `given`."""
         return asked
 
 
 class CodedGain(NamedTuple):
-    """A gain in fixed point: its ends, its additions to the errors of its output and of its inverse in output codes,
-    without their final rounding, and the largest offset."""
+    """A gain in fixed point: its least and largest values, what it adds to the errors of its output and of its inverse
+    in output codes, without their final rounding, and the largest offset."""
 
     least: float
     largest: float
@@ -231,7 +231,7 @@ class CodedGain(NamedTuple):
 
 
 class Coding(NamedTuple):
-    """Units per code of drive and output, and the `span` of the output in codes."""
+    """Units per code of the drive and of the output, and the `span` of the output in codes."""
 
     drive_lsb: float
     output_lsb: float
@@ -240,7 +240,7 @@ class Coding(NamedTuple):
 
 class Sought(NamedTuple):
     """The setting in which a block behind the plays is solved: sizes of its input and of the sum asked of the plays,
-    the unit of signals, how far `apart` states behind the play sum, and their inputs, may be; `same`: not at all."""
+    the unit of signals, how far `apart` states behind the play sum and their inputs may be; `same`: they are equal."""
 
     size: float
     asked: float
@@ -262,11 +262,11 @@ class Coded:
 
     @property
     def follows(self) -> float:
-        """Change of the output for a change of the input in one sample, as a share."""
+        """Share of a change of the input that reaches the output in the same sample."""
         return 1.0
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs within a size, with signals of this unit."""
+        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
         return 0.0
 
     def solved(self, error: float, at: Sought) -> float:
@@ -274,18 +274,18 @@ class Coded:
         return error
 
     def residual(self, missed: float, same: bool) -> float:
-        """Error of the output after the inverse, for an error of the play sum."""
+        """Error of the output after the inverse that results from an error of the play sum."""
         return missed
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain | None:
-        """The block's properties as a gain, for inputs within a size; None if it is not one."""
+        """The block's properties as a gain, for inputs up to `size`; None if it is not a gain."""
         return None
 
 
 @dataclass(frozen=True)
 class Surroundings:
     """What the tables of a part depend on besides its blocks: the length of a step, the `ends` of the drive's range,
-    the `span` of the output, the samples by which references come `ahead`, and whether a lead is `braked`."""
+    the `span` of the output, the number of samples by which references are `ahead`, and whether a lead is `braked`."""
 
     seconds: float
     ends: tuple[float, float]
@@ -305,7 +305,7 @@ class FloatSurroundings(Surroundings):
 @dataclass(frozen=True)
 class FixedSurroundings(Surroundings):
     """The same in fixed point: units per code, `bits` of signals behind the plays below a code, bits of a code and the
-    largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals `farthest`."""
+    largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span `farthest` in signals."""
 
     drive_lsb: Fraction
     output_lsb: Fraction
@@ -326,9 +326,9 @@ class FixedSurroundings(Surroundings):
 @dataclass(frozen=True)
 class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
-    fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output.
+    fixed point the tables are made from `formats` of a block, the surroundings, and the largest input and output.
 
-    `kinds`: in its C; `beside`: constants of an additional struct for each block.
+    `kinds`: of its C; `beside`: constants of an additional struct for each block.
     """
 
     verbs: Verbs
@@ -340,8 +340,8 @@ class Realized:
 
 
 class Setting(NamedTuple):
-    """What decides whether the C can include an effect: all effects of its part in order, those up to a slew limit, the
-    operator, the length of a step, the `ends` of the drive's range, and whether the arithmetic is fixed point."""
+    """The data on which depends whether the C can include an effect: all effects of its part in order, those up to a
+    slew limit, the operator, the length of a step, the `ends` of the drive's range, and whether it is fixed point."""
 
     listed: Sequence[Effect]
     slewed: Sequence[Effect]
@@ -352,7 +352,7 @@ class Setting(NamedTuple):
 
 
 class Unmeasured(NamedTuple):
-    """An effect that nothing measures, which is compensated only if `emit.compensation.compensate` lists its `key`:
+    """An effect that nothing measures, compensated only if `emit.compensation.compensate` lists its `key`; the reasons
     why the C does not include it otherwise, and why a known reference does not help."""
 
     key: str
@@ -367,28 +367,28 @@ def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Any]:
 
 
 def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
-    """A test whether an effect has a name, and passes `only` if that is given."""
+    """A test whether an effect has this name, and passes the test `only` if given."""
     return lambda effect: effect.name == name and (only is None or only(effect))
 
 
 def given(place: Place) -> Callable[[Any], bool]:
-    """A test whether an effect brings its own block, in front of the plays or behind them."""
+    """A test whether an effect has a block of its own, in front of the plays or behind them."""
     return lambda effect: effect.block is not None and (effect.place is Place.DRIVE) == (place is Place.DRIVE)
 
 
 @dataclass(frozen=True)
 class ChainPart:
-    """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether it is the block of
-    an effect; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
-    interface that it serves; `forward`: only the forward operator has it; `joined`: all of them form one block;
+    """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether an effect has this
+    kind of block; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
+    interface that it serves; `forward`: only the forward operator has it; `joined`: all its blocks are one in C;
     `coded`: loads its fixed-point version, for models in fixed point.
 
-    `longest`: the longest travel that can be set, in its tables. `problems`: why the C cannot include an effect;
+    `longest`: the longest travel that can be set, from its tables. `problems`: why the C cannot include an effect;
     `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
-    how many of each there are in its tables, by default its blocks.
+    how many of each its tables contain, by default its blocks.
 
-    In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of one behind
-    the plays that follows the drive; `no_inverse`: why there is no inverse.
+    In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of an effect
+    behind the plays that depends on the drive; `no_inverse`: why there is no inverse.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""A user's own effects, from Python files in the form of the catalogue's."""
+"""A user's own effects, from Python files in the form of those of the catalogue."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from hystgen.effects.base import USER, Effect, Place
 
 
 class _AsItStands(importlib.machinery.SourceFileLoader):
-    """Loads a file as it stands now: Python's cache of bytecode knows a file by its second and size alone, and would
-    answer with the one before an edit that changes neither."""
+    """Loads a file as it is now: Python's bytecode cache identifies a version of a file only by its size and time in
+    seconds, and would return the old version after an edit that changes neither."""
 
     def path_stats(self, path: str) -> NoReturn:
         raise OSError("not to be cached")
@@ -32,19 +32,19 @@ METHODS = {
     Place.OUTPUT: ("mapped",),
     Place.ADDED: ("added",),
 }
-"""Methods of a class by place; it has to define at least one of them."""
+"""Methods by place, at least one of which a class has to define."""
 
 
 def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
     """The effect classes that a Python file, or the `model.py` of a folder, defines; it is run, so it must be trusted.
 
-    Each is a subclass of `hystgen.effects.Effect` with `name: Literal["user:..."]`, a `place` and the method of that
-    place; several classes of one name are its shapes, the first is the default. Raises EffectsError, one message, for a
-    file that cannot be run or has no usable effect.
+    Each is a subclass of `hystgen.effects.Effect` with `name: Literal["user:..."]`, a `place` and a method of that
+    place; several classes of one name are its shapes, the first being the default. Raises EffectsError with one message
+    if the file cannot be run or has no usable effect.
     """
     file = Path(path)
     file = file / "model.py" if file.is_dir() else file
-    # A name of its own for every file and content, as pickling and numba find functions by it
+    # A separate name for every file and content, since pickling and numba find functions by module name
     try:
         mark = hashlib.sha256(str(file.resolve()).encode() + file.read_bytes()).hexdigest()[:12]
     except OSError as error:
@@ -78,7 +78,7 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
 
 
 def _line(error: BaseException, file: Path) -> str:
-    """`:LINE` of the file where running it failed, if it was there."""
+    """`:LINE` of the file at which running it failed; empty if it failed elsewhere."""
     if isinstance(error, SyntaxError):
         return f":{error.lineno}"
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
@@ -86,7 +86,7 @@ def _line(error: BaseException, file: Path) -> str:
 
 
 def _problem(effect: type[Effect]) -> str:
-    """Why a class cannot be used, or nothing."""
+    """Why a class cannot be used; empty if it can."""
     words: tuple[object, ...] = getattr(effect.model_fields["name"].annotation, "__args__", ())
     if len(words) != 1 or not str(words[0]).startswith(USER) or words[0] == USER:
         return 'needs a name of its own; write name: Literal["user:my_effect"]'
@@ -94,5 +94,5 @@ def _problem(effect: type[Effect]) -> str:
         return "needs a place; write place: ClassVar[Place] = Place.OUTPUT, or another of hystgen.effects.Place"
     methods = METHODS[effect.place]
     if not any(getattr(effect, method) is not getattr(Effect, method) for method in methods):
-        return f"has place {effect.place.value}, for which it has to define {' or '.join(methods)}"
+        return f"has place {effect.place.value}, so it has to define {' or '.join(methods)}"
     return own.problem(effect)

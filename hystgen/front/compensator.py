@@ -1,4 +1,4 @@
-"""The memoryless part in floating point: the stages of the front one after another."""
+"""The memoryless part in floating point: the stages of the front in series."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def front_forward(t: StageTables, v: Scalar, ascending: int) -> Scalar:
 
 @jit
 def front_inverse(t: StageTables, w: Scalar, ascending: int) -> tuple[Scalar, int]:
-    """v = G^-1[w] on one branch, stages in reverse order, and whether an envelope's argument was limited."""
+    """v = G^-1[w] on one branch, with the stages in reverse order, and whether an envelope's argument was limited."""
     v = w
     limited = 0
     for j in range(len(t.stage_kind) - 1, -1, -1):

@@ -15,7 +15,7 @@ FORWARD, INVERSE = 0, 2
 
 @jit
 def curve(t: Polynomials, which: int, x: int) -> int:
-    """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that x lies on, h = 0 .. 1 along it."""
+    """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece on which x lies, with h = 0 .. 1 along it."""
     j = t.first[which]
     high = j + t.pieces[which] - 1
     while j < high:
@@ -41,7 +41,7 @@ def front_forward(t: CurveTables, v: int, ascending: int) -> int:
 
 @jit
 def front_inverse(t: CurveTables, w: int, ascending: int) -> tuple[int, int]:
-    """v = G^-1[w] on one branch, one code beyond the range if w lies beyond it, and whether an envelope limits w."""
+    """v = G^-1[w] on one branch (one code out of range if w is beyond its domain), and whether an envelope limits w."""
     if not t.fronts:
         return nearest(w, t.limits[FINE]), 0
     which = INVERSE + 1 - ascending

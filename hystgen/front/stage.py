@@ -1,4 +1,4 @@
-"""The interface of a memoryless stage in front of the plays, and the constants that its functions need."""
+"""The interface of a memoryless stage in front of the plays, and the constants that the stages' functions need."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class Stage(Protocol):
-    """A memoryless part, strictly monotone where it can be inverted; `ascending` picks the branch."""
+    """A memoryless stage, strictly monotone where it can be inverted; `ascending` selects the branch."""
 
     @property
     def branches_differ(self) -> bool:
@@ -54,7 +54,7 @@ class StageTables(Protocol):
 
 
 class Polynomials(Protocol):
-    """Curves as pieces of polynomials in fixed point."""
+    """Curves in fixed point, as piecewise polynomials."""
 
     @property
     def knot(self) -> Reals: ...

@@ -1,1 +1,1 @@
-"""Plays: the operators of the literature, their memory, and the two engines that compute their sum."""
+"""Plays: the operators as the literature defines them, their memory, and the two engines that compute their sum."""

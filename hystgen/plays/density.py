@@ -1,24 +1,24 @@
 """Densities of the continuous model, and the thresholds and weights that represent them.
 
-The continuous model is `y = p0 v + int_0^R p(r) play_r[v] dr` (18 of the note). `[0, R]` is cut into n equal
-cells; each becomes one play with the cell's mass as weight and its centroid as threshold.
+The continuous model is `y = p0 v + int_0^R p(r) play_r[v] dr` (18 of the note). `[0, R]` is divided into n equal
+cells; each becomes one play with the cell's mass as its weight and the cell's centroid as its threshold.
 
-Error of the initial loading curve (19). Let D be the continuous curve less the play sum's. Since mass and first moment
-are kept, D and its slope vanish at every cell boundary. In a cell [a, b] with threshold c the slope of D grows by the
-density, `D'' = p >= 0`, except for a fall by the whole mass at c: D rises from 0 up to c and falls back to 0 behind it.
-So the play sum never lies above the curve, and below it by at most `D(c) = int_a^c (c - r) p(r) dr`.
+Error of the initial loading curve (19). Let D be the continuous curve minus that of the play sum. Since each cell keeps
+its mass and first moment, D and its slope vanish at every cell boundary. In a cell [a, b] with threshold c the slope of
+D grows by the density, `D'' = p >= 0`, except that it drops by the whole mass at c: D rises from 0 up to c and then
+falls back to 0. So the play sum never lies above the curve, and at most `D(c) = int_a^c (c - r) p(r) dr` below it.
 
-Error of the output, for every drive and history. The play of threshold r, `s(r)`, is a memory with `|s(r) - s(r')| <=
-|r - r'|`. A cell of mass m is wrong by `|int p s dr - m s(c)| <= int p |r - c| dr`, which is `2 D(c)`: both sides of
-the centroid c have the same moment. The sum of `2 D(c)` over the cells is a bound, and no smaller one holds: a history
-that turns at every threshold and every boundary reaches it.
+Error of the output, for every drive and history. The plays' states s(r) satisfy `|s(r) - s(r')| <= |r - r'|`. A cell of
+mass m contributes an error of `|int p s dr - m s(c)| <= int p |r - c| dr`, which is `2 D(c)` because both sides of the
+centroid c have the same moment. The sum of `2 D(c)` over the cells is a bound, and it is tight: a history that turns at
+every threshold and every boundary reaches it.
 
 Everything is computed with 40 digits and rounded to double once at the end, so that every machine gets the same
 numbers. A formula is replaced by polynomials on panels that are halved until the polynomials agree with it; the bound
 includes the remaining difference.
 
-The work is bounded by counts, so equally on every machine: no formula of the permitted length takes longer than about
-10 s.
+The work is limited by operation counts, not time, so the limit is the same on every machine: no formula of the
+permitted length takes longer than about 10 s.
 """
 
 from __future__ import annotations
@@ -44,29 +44,29 @@ MAX_FORMULA = 1000
 FUNCTIONS = ("exp", "log", "sqrt", "sin", "cos", "tanh")
 
 _DIGITS = 40
-"""Decimal digits of the arithmetic: the powers of a panel's polynomial lose six of them, and 34 remain."""
+"""Decimal digits of the arithmetic: converting a panel's polynomial to powers loses six of them, and 34 remain."""
 _DEGREE = 16
-"""Degree of the polynomials; a panel takes 33 values of the formula."""
+"""Degree of the polynomials; a panel evaluates the formula 33 times."""
 _FIRST_PANELS = 64
-"""Panels at the start, enough to see a narrow peak."""
+"""Initial number of panels, enough to detect a narrow peak."""
 _MAX_PANELS = 600
-"""Most panels: a formula that takes more has a pole, or oscillates too fast."""
+"""Maximum number of panels: a formula that needs more has a pole or oscillates too fast."""
 _MAX_HALVINGS = 60
-"""Most halvings of the range down to a panel, beyond which doubles do not tell its ends apart."""
+"""Maximum number of halvings from the range to a panel; beyond it the panel's ends are the same double."""
 _PRECISION = 1e-20
 """Largest error of a panel's polynomial, relative to the whole mass."""
 _LARGEST_EXPONENT = 1000
 _SMALLEST_EXPONENT = -4000
-"""Binary exponents beyond which an intermediate value is refused, or taken as 0."""
+"""Binary exponents: above the first an intermediate value is refused, below the second it is taken as 0."""
 _LARGE_POWER = 1 << 16
-"""Exponents of `**` beyond which it goes through the logarithm."""
+"""Exponents of `**` above which a power is computed from the logarithm."""
 _MAX_OPERATIONS = 2_000_000
-"""Operations that a formula may take in all, 1 to 5 us each (tests/test_density.py has the slowest formulas). A sum of
-29 bell curves, about the most that fits into a formula, takes 600 000."""
+"""Total number of operations allowed for a formula, 1 to 5 us each (tests/test_density.py has the slowest formulas). A
+sum of 29 bell curves, about the longest that fits into a formula, takes 600 000."""
 
 
 class DensityError(ValueError):
-    """A density that cannot be used: `part` is the key at fault, the message what is wrong and what to do."""
+    """A density that cannot be used: `part` is the key at fault; the message says what is wrong and what to do."""
 
     def __init__(self, part: str, message: str) -> None:
         self.part = part
@@ -78,8 +78,8 @@ class Discretisation:
     """Play sum of a density: `thresholds` (r_0 = 0 first), `weights` (p_0 first), same length.
 
     `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output units;
-    beyond R the two differ by rounding only. `output_error` bounds the output's error, for every drive and history that
-    leave the plays within R of zero; further out the rounding of the weights grows with the plays.
+    beyond R the slopes differ only by rounding. `output_error` bounds the output's error for every drive and history
+    that keep the plays within R of zero; further out, the rounding of the weights counts in proportion to the plays.
     """
 
     thresholds: tuple[float, ...]
@@ -90,7 +90,7 @@ class Discretisation:
 
 @cache
 def _context() -> MPContext:
-    """A multiple-precision context of our own; the global one belongs to the user."""
+    """A multiple-precision context of this package; the global one belongs to the user."""
     from mpmath.ctx_mp import MPContext
 
     context = MPContext()
@@ -154,8 +154,8 @@ class Formula:
 def _power(base: mpf, exponent: mpf) -> mpf:
     """`base**exponent`. Raises ValueError where it is not real.
 
-    A large exponent goes through the logarithm, with the extra bits that this costs: an integer power would go bit by
-    bit, up to a thousand of them, with growing numbers.
+    A large exponent is handled by the logarithm, with the extra bits that this costs: an integer power would take up to
+    a thousand squarings of ever longer numbers.
     """
     mp = _context()
     if abs(exponent) <= _LARGE_POWER or base == 0:
@@ -170,13 +170,13 @@ def _power(base: mpf, exponent: mpf) -> mpf:
 def parse_formula(text: str) -> Formula:
     """Parse `+ - * / ** ( ) r numbers` and the functions exp, log, sqrt, sin, cos, tanh.
 
-    `**` binds tightest and to the right, then the sign in front of a value, as usual: `-r**2` is `-(r**2)`.
-    Raises DensityError with the character (from 1) at which the formula goes wrong.
+    As usual, `**` binds tightest and to the right, then the sign in front of a value: `-r**2` is `-(r**2)`.
+    Raises DensityError with the position (from 1) of the character at which the formula goes wrong.
     """
     if len(text) > MAX_FORMULA:
         raise DensityError("formula", f"has {len(text)} characters, more than {MAX_FORMULA}; shorten it")
     steps: list[str] = []
-    waiting: list[tuple[str, int]] = []  # operators, functions and open brackets, with their character
+    waiting: list[tuple[str, int]] = []  # operators, functions and open brackets, with their positions
     operand_next = True
     for match in _TOKEN.finditer(text):
         token, at = match[match.lastgroup or 0], match.start(match.lastgroup or 0) + 1
@@ -216,7 +216,7 @@ def parse_formula(text: str) -> Formula:
             if waiting and waiting[-1][0] in FUNCTIONS:
                 steps.append(waiting.pop()[0])
         else:
-            tightest = _BINDING[token] + (token == "**")  # to the right: an equal one waits
+            tightest = _BINDING[token] + (token == "**")  # ** binds to the right: an earlier ** waits
             while waiting and _BINDING.get(waiting[-1][0], 0) >= tightest:
                 steps.append(waiting.pop()[0])
             waiting.append((token, at))
@@ -258,7 +258,7 @@ def _short(r: mpf) -> str:
 
 
 def _polynomial(coefficients: Sequence[mpf], t: mpf) -> mpf:
-    """Value at t, coefficients from the highest power down."""
+    """Value at t; coefficients from the highest power down."""
     value = 0
     for c in coefficients:
         value = value * t + c
@@ -307,10 +307,10 @@ class Density:
         return self._before[i][0] + mass, self._before[i][1] + moment
 
     def discretise(self, p0: float, n: int) -> Discretisation:
-        """Thresholds and weights of n equal cells of the density (18) behind `r_0 = 0` and `p0`.
+        """Thresholds and weights of n equal cells of the density (18), after `r_0 = 0` and `p0`.
 
-        `p0` in output per input unit, as the weights that are returned; thresholds in input units; `n` from 1 on.
-        Raises ValueError for other numbers, DensityError for cells so narrow that thresholds coincide.
+        `p0` and the weights in output per input unit; thresholds in input units; `n` at least 1. Raises ValueError for
+        other numbers, DensityError for cells so narrow that thresholds coincide.
         """
         finite(p0=p0)
         whole_from(1, n=n)
@@ -331,9 +331,9 @@ class Density:
             weights.append(float(weight))
             if not thresholds[-2] < thresholds[-1]:
                 what = f"two of {n} thresholds coincide at r = {_short(threshold)}"
-                raise DensityError(self._part, f"{what}; take fewer, or a density that is spread wider")
+                raise DensityError(self._part, f"{what}; take fewer, or a wider density")
             start, mass, moment = end, mass_end, moment_end
-        # Polynomials beside the formula, cells set to zero, weights and thresholds rounded to double.
+        # Polynomials that differ from the formula, cells set to zero, weights and thresholds rounded to double.
         margin = 2 * ((n + 2) * self._noise + 2.0**-52 * self._total) * self.r_max
         errors = (
             0.0 if self._total == 0 else math.nextafter(float(bound + margin), math.inf) for bound in (worst, total)
@@ -343,9 +343,9 @@ class Density:
     def discretise_to(self, p0: float, tolerance: float) -> Discretisation:
         """The fewest equal cells of the density (18), up to 4096, whose error bound is at most `tolerance`.
 
-        `tolerance` > 0 in output units, of the loading curve (19); `p0` in output per input unit. The bound falls like
-        1/n**2; it is searched as if it fell at every step. Raises ValueError for other numbers and DensityError, naming
-        the bound within reach, if 4096 are not enough.
+        `tolerance` > 0, of the loading curve (19), in output units; `p0` in output per input unit. The bound falls like
+        1/n**2; the search assumes that it falls with every n. Raises ValueError for other numbers, and DensityError,
+        with the bound that can be reached, if 4096 are not enough.
         """
         positive(tolerance=tolerance)
         too_few, enough, found = 0, MAX_PLAYS + 1, None
@@ -369,7 +369,7 @@ class Density:
 def from_table(r: Sequence[float], p: Sequence[float]) -> Density:
     """Piecewise linear density through the points `(r, p)`, zero outside them.
 
-    `r` rises strictly from 0 or more, `p >= 0`, same length of at least 2; the caller has checked that.
+    `r` rises strictly from 0 or more, `p >= 0`, both of the same length of at least 2; the caller has checked that.
     """
     real = _context().mpf
     knots = [real(x) for x in r]
@@ -403,7 +403,7 @@ def _fit() -> tuple[list[mpf], list[mpf], list[list[mpf]]]:
 def from_formula(formula: Formula, r_max: float) -> Density:
     """The formula on `[0, r_max]`, r_max > 0.
 
-    Raises DensityError where it has no finite real value, is negative, does not become smooth under repeated halving
+    Raises DensityError if it has no finite real value, is negative, does not become smooth under repeated halving
     (a pole, or oscillations too fast to follow), or takes more than 2 million operations.
     """
     mp = _context()

@@ -1,11 +1,11 @@
 """Elastoplastic elements, solved as one-dimensional plasticity: the mechanics of play and stop (7)-(17).
 
 A spring of modulus E and a rigid-plastic slider of yield stress r, in parallel or in series. A step is a return
-mapping: a trial with the slider at rest, kept where the slider can bear it and returned to the yield stress otherwise.
+mapping: a trial stress with the slider at rest, kept if the slider can bear it, else returned to the yield stress.
 No operator is involved, so the elements test the operators independently.
 
-A slider obeys `stress in r sign(rate)`, set-valued at rest, with the rate of its own strain; the note prints the rate
-of the whole strain in (16).
+A slider obeys `stress in r sign(rate)`, set-valued at rest, where `rate` is that of its own strain; the note prints the
+rate of the total strain in (16).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class Parallel(NamedTuple):
-    """Answer of the parallel element, arrays (N,); the stresses add up to the one applied (7)."""
+    """Response of the parallel element, arrays (N,); the stresses add up to the applied stress (7)."""
 
     strain: Array
     elastic_stress: Array
@@ -30,7 +30,7 @@ class Parallel(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Answer of the series element, arrays (N,); the strains add up to the one applied (13)."""
+    """Response of the series element, arrays (N,); the strains add up to the applied strain (13)."""
 
     stress: Array
     elastic_strain: Array
@@ -39,17 +39,17 @@ class Series(NamedTuple):
 
 def _check(modulus: float, yield_stress: float) -> None:
     if not (modulus > 0.0 and math.isfinite(modulus)):
-        raise ValueError("a modulus is a positive number")
+        raise ValueError("a modulus must be positive")
     if not (yield_stress >= 0.0 and math.isfinite(yield_stress)):
-        raise ValueError("a yield stress is a number that is not negative")
+        raise ValueError("a yield stress must not be negative")
 
 
 def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
     """Spring and slider in parallel under a given stress (7)-(11); `strain`: of both, before the first sample.
 
     `stress`: N samples in the unit of `yield_stress`, which is the unit of `modulus` times `strain`. The strain is
-    `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not positive, a
-    negative yield stress, and samples or a start that are not finite.
+    `play_r[stress] / E` (12), with the play started at `E strain`. Raises ValueError for a modulus that is not
+    positive, a negative yield stress, and samples or a start that are not finite.
     """
     _check(modulus, yield_stress)
     finite(strain=strain)
@@ -66,7 +66,7 @@ def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: flo
 
 
 def series(strain: ArrayLike, modulus: float, yield_stress: float, plastic_strain: float = 0.0) -> Series:
-    """Spring and slider in series under a given strain (13)-(16); `plastic_strain` is the slider's before sample 0.
+    """Spring and slider in series under a given strain (13)-(16); `plastic_strain`: of the slider, before sample 0.
 
     `strain`: N samples in the unit of `plastic_strain`; that times the unit of `modulus` is the unit of `yield_stress`.
     The stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises ValueError as `parallel` does.

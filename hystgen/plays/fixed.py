@@ -1,7 +1,7 @@
 """Plays in fixed point: rounding, dividing by a slope with a reciprocal, and solving in engine loop.
 
-Inputs of the plays are whole multiples of a least step, sums are whole multiples of a fraction of the output code, and
-both engines compute the same whole numbers, so that they agree in every bit.
+Inputs of the plays are integer multiples of a smallest step, sums are integer multiples of a fraction of an output
+code, and both engines compute the same integers, so they agree in every bit.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def quotient(x: int, y: int) -> int:
 
 @jit
 def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> int:
-    """The input of the plays at which the output is d beyond the output at w, at most a little outside their range."""
+    """The input of the plays, at most slightly outside their range, at which the output is d beyond that at w."""
     step = divide_by_slope(t, d, k)
     if rising:
         most = t.limits[PLAY_MAX] + t.limits[MARGIN]
@@ -121,7 +121,7 @@ def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> in
 
 @jit
 def loop_solve(t: FixedPlayTables, s: State, output: int) -> int:
-    """Input of the plays that gives `output`: on the way there, one play after another begins to follow."""
+    """Input of the plays that gives `output`, found by letting one play after another begin to follow."""
     here = loop_output(t, s)
     w = s.play[0]
     if output == here:

@@ -1,8 +1,8 @@
-"""The plays of engine loop: every play in every sample, in floating point, and the parts that fixed point shares.
+"""The plays of engine loop, which moves every play in every sample: floating point, and parts shared by fixed point.
 
 Functions that also exist in C have the same names here as in `c_runtime/`, and the same operations in the same order
-and arithmetic, so that results can be compared bit for bit. They know nothing of numpy's or numba's types: they run as
-plain Python on scalars of their arrays, or compiled (see `hystgen.basics.jit`). Real constants come out of arrays
+and arithmetic, so that results can be compared bit for bit. They do not depend on numpy's or numba's types: they run as
+plain Python on the scalars of their arrays, or compiled (see `hystgen.basics.jit`). Real constants come from arrays
 because a literal would not have the arithmetic's type.
 """
 
@@ -28,7 +28,7 @@ class PlayTables(Protocol):
 
 
 class LoopTables(PlayTables, Protocol):
-    """The further constants that solving needs in floating point."""
+    """The additional constants that solving needs in floating point."""
 
     @property
     def lift(self) -> Reals: ...
@@ -44,7 +44,7 @@ class State(NamedTuple):
 
 
 def new_state(t: PlayTables) -> State:
-    """Memory for one instance of the model; `init` gives it its values."""
+    """Memory for one instance of the model; `init` sets its values."""
     dtype = t.threshold.dtype
     return State(StepState.zeros(1, dtype), np.zeros(len(t.threshold), dtype))
 
@@ -54,14 +54,14 @@ def new_state(t: PlayTables) -> State:
 
 @jit
 def loop_rest(s: State, w: Scalar) -> None:
-    """Every play holds w."""
+    """Set every play to w."""
     for i in range(len(s.play)):
         s.play[i] = w
 
 
 @jit
 def loop_start(s: State, start: Reals) -> None:
-    """Each play holds its own start value."""
+    """Set each play to its own start value."""
     for i in range(len(s.play)):
         s.play[i] = start[i]
 
@@ -91,8 +91,8 @@ def loop_output(t: PlayTables, s: State) -> Element:
 
 @jit
 def loop_solve(t: LoopTables, s: State, output: Scalar) -> Scalar:
-    """Input of the plays that gives `output`: assumes that every play follows, then drops the largest thresholds one by
-    one until the solution reaches the last play that is left."""
+    """Input of the plays that gives `output`: assumes that every play follows, then drops the plays with the largest
+    thresholds one by one until the solution makes the last remaining play follow."""
     rising = output >= loop_output(t, s)
     tail = t.limits[ZERO]
     next_follows = t.limits[ZERO]

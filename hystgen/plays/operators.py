@@ -1,7 +1,7 @@
-"""The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
+"""The operators of the Prandtl-Ishlinskii literature, sample by sample, as defined there.
 
-Identification builds its regressors from these definitions, and everything faster is tested against them. Signals are
-one-dimensional arrays `v_0, v_1, ...`; equation numbers refer to the tutorial note named in `docs/note.md`.
+Identification builds its regressors from these definitions, and every faster version is tested against them. Signals
+are one-dimensional arrays `v_0, v_1, ...`; equation numbers refer to the tutorial note named in `docs/note.md`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @jit
 def followed(state: float, x: float, r: float) -> float:
-    """State of a play of threshold r after its input has gone to `x`."""
+    """State of a play of threshold r after its input has moved to `x`."""
     low = x - r
     high = x + r
     if state > high:
@@ -37,7 +37,7 @@ def _play_into(v: Array, r: float, state: float, out: Array) -> float:
 
 @jit
 def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
-    # Four side by side, since each by itself waits for its own last sample
+    # Four at a time: a single play's recursion would stall on its previous sample
     fours = len(r) // 4 * 4
     for i in range(0, fours, 4):
         r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
@@ -93,12 +93,12 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
 
 
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
-    """Play operator: `s_k = max(v_k - r, min(v_k + r, s_(k-1)))`, started at `start` (1)(2).
+    """Play operator: `s_k = max(v_k - r, min(v_k + r, s_(k-1)))`, starting at `start` (1)(2).
 
     `v`: N samples; returns N samples in the same unit. Raises ValueError for a negative threshold.
     """
     if threshold < 0:
-        raise ValueError("a play threshold is not negative")
+        raise ValueError("a play threshold must not be negative")
     signal = samples(v)
     out = np.empty_like(signal)
     _play_into(signal, float(threshold), float(start), out)
@@ -106,15 +106,15 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
 
 
 def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
-    """All plays of a model (1)(2): row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N).
+    """All plays of a model (1)(2): row i is the play of `thresholds[i]` starting at `start[i]`; shape (n+1, N).
 
-    `v`: N samples; `thresholds`: n+1 numbers, and `start` as many or one for all, in the unit of the samples; the
-    result has the same unit. Raises ValueError for a negative threshold and for other shapes.
+    `v`: N samples; `thresholds`: n+1 numbers; `start`: n+1 numbers, or one for all; all of them and the result in the
+    unit of the samples. Raises ValueError for a negative threshold and for other shapes.
     """
     signal = samples(v)
     r = np.asarray(thresholds, dtype=np.float64, order="C")
     if r.ndim != 1 or (r < 0.0).any():
-        raise ValueError("play thresholds are a list of numbers that are not negative")
+        raise ValueError("play thresholds must be a list of nonnegative numbers")
     states = np.full(r.shape, start, dtype=np.float64)
     out = np.empty((len(r), len(signal)))
     _plays_into(signal, r, states, out)
@@ -122,7 +122,7 @@ def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
 
 
 def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array:
-    """`weights @ plays(v, thresholds, start)`, without the plays of weight 0."""
+    """`weights @ plays(v, thresholds, start)`, skipping plays of weight 0."""
     signal = samples(v)
     out = np.empty_like(signal)
     some = np.flatnonzero(weights)
@@ -131,7 +131,7 @@ def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array
 
 
 def weighted_sum(weights: Array, rows: Array) -> Array:
-    """`weights @ rows` (N,), without rows of weight 0, added one after the other; for plays it equals `play_sum`."""
+    """`weights @ rows` (N,), added row by row, skipping rows of weight 0; for plays it equals `play_sum`."""
     out = np.empty(rows.shape[1])
     _weighted_into(weights, rows, out)
     return out
@@ -140,10 +140,10 @@ def weighted_sum(weights: Array, rows: Array) -> Array:
 def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """Stop operator: `e_k = clip(e_(k-1) + v_k - v_(k-1), -r, r)`, `e_0 = clip(v_0 - start, -r, r)` (4)(5), corrected.
 
-    With the play of the same threshold and start it adds up to the input (26).
+    Together with the play of the same threshold and start it adds up to the input (26).
     """
     if threshold < 0:
-        raise ValueError("a stop threshold is not negative")
+        raise ValueError("a stop threshold must not be negative")
     signal = samples(v)
     out = np.empty_like(signal)
     _stop_into(signal, float(threshold), float(start), 0.0, out)

@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 
 # The memory of the plays. After any input the states satisfy |s_i - s_(i-1)| <= r_i - r_(i-1) with s_0 = w, the input
-# of the plays. A state list that breaks this cannot have come from any history, and the inverse is not exact with it.
+# of the plays. States that violate this cannot result from any history, and the inverse is not exact with them.
 
 
 def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> tuple[tuple[float, ...], bool]:
     """The admissible start memory nearest to the requested one, and whether it had to be changed.
 
-    `requested`: one number for all plays, or n+1 numbers of which entry 0 (the input) is ignored. Going up from play
-    1, which is kept, each play is moved into reach of the one before. The result starts with `s_0 = s_1`.
+    `requested`: one number for all plays, or n+1 numbers of which entry 0 (the input) is ignored. Play 1 is kept; then
+    each play in turn is moved into reach of the previous play. The result starts with `s_0 = s_1`.
     Raises ValueError for a list of the wrong length.
     """
     n = len(thresholds) - 1
@@ -40,7 +40,7 @@ def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> 
     for i in range(2, n + 1):
         reach = thresholds[i] - thresholds[i - 1]
         states.append(min(max(float(requested[i]), states[-1] - reach), states[-1] + reach))
-    # sums of decimal numbers are off by rounding, which does not count as a projection
+    # sums of decimal numbers are inexact by rounding, which does not count as a projection
     grain = 8 * np.finfo(np.float64).eps
     moved = any(
         abs(a - float(b)) > grain * max(abs(a), abs(float(b)), r)
@@ -50,15 +50,15 @@ def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> 
 
 
 def is_admissible(states: Sequence[float], thresholds: Sequence[float], tolerance: float = 0.0) -> bool:
-    """Whether the states could have come from some history."""
+    """Whether some history leads to these states."""
     steps = np.abs(np.diff(np.asarray(states, dtype=np.float64)))
     return bool(np.all(steps <= np.diff(np.asarray(thresholds, dtype=np.float64)) + tolerance))
 
 
 def through(states: Sequence[float], weights: Sequence[float]) -> Array:
-    """States of the inverse's plays for states of the model's: `zeta_i = C_i s_i + sum over g > i of p_g s_g`.
+    """States of the inverse's plays from those of the model's plays: `zeta_i = C_i s_i + sum over g > i of p_g s_g`.
 
-    `C_i = p_0 + ... + p_i`. With the weights of the inverse the same rule leads back.
+    `C_i = p_0 + ... + p_i`. With the weights of the inverse the same formula gives the model's states back.
     """
     s = np.asarray(states, dtype=np.float64)
     p = np.asarray(weights, dtype=np.float64)
@@ -71,8 +71,8 @@ class PlaySum:
     """Play sum `y = p_0 v + sum p_i play_(r_i)[v]` (21).
 
     `thresholds`: r_0 = 0 < r_1 < ... < r_n in units of the input; `weights`: p_0 .. p_n, any finite numbers, in output
-    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected`: whether it
-    was). Raises ValueError for anything else.
+    per input unit; `initial_state`: one number or n+1 numbers, projected to the admissible set (`projected`: whether
+    that changed them). Raises ValueError for anything else.
     """
 
     thresholds: Sequence[float]
@@ -85,7 +85,7 @@ class PlaySum:
         thresholds = finite_numbers(self.thresholds, "thresholds")
         weights = finite_numbers(self.weights, "weights")
         if thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(thresholds)):
-            raise ValueError("thresholds start with 0 and rise strictly")
+            raise ValueError("thresholds must start with 0 and rise strictly")
         if len(weights) != len(thresholds):
             raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         requested: float | tuple[float, ...]
@@ -110,14 +110,14 @@ class PlaySum:
         """The play sum whose initial loading curve is the polygon through the points: `p_0 = phi'(0)`, and the weight
         at each corner is the change of slope there (22)(23); the limit is the density `p(r) = phi''(r)`.
 
-        `x`: N + 1 points from 0, strictly rising, in input units; `phi`: the curve there, from 0, in output units; the
-        last slope goes on beyond the last point. The thresholds are the first N points. Raises ValueError otherwise.
+        `x`: N + 1 strictly rising points from 0 on, in input units; `phi`: the curve's values there, from 0, in output
+        units. The last slope continues beyond. The thresholds are the first N points. Raises ValueError otherwise.
         """
         points, curve = finite_numbers(np.asarray(x).tolist(), "x"), finite_numbers(np.asarray(phi).tolist(), "phi")
         if len(points) != len(curve) or len(points) < 2:
-            raise ValueError("a loading curve has as many values as points, at least two")
+            raise ValueError("a loading curve needs as many values as points, at least two")
         if points[0] != 0.0 or curve[0] != 0.0 or not np.all(np.diff(points) > 0.0):
-            raise ValueError("a loading curve starts at (0, 0) and its points rise strictly")
+            raise ValueError("a loading curve must start at (0, 0), with strictly rising points")
         with np.errstate(over="ignore", invalid="ignore"):
             weights = np.diff(np.diff(curve) / np.diff(points), prepend=0.0)
         if not np.all(np.isfinite(weights)):
@@ -126,7 +126,7 @@ class PlaySum:
 
     @property
     def n(self) -> int:
-        """Number of plays without r_0."""
+        """Number of plays, excluding r_0."""
         return len(self.thresholds) - 1
 
     @cached_property
@@ -136,7 +136,7 @@ class PlaySum:
 
     @property
     def width(self) -> float:
-        """Largest full width of the loop, `2 sum p_i r_i / sum p_i` (32), corrected to count p_0 below the line."""
+        """Largest full width of the loop, `2 sum p_i r_i / sum p_i` (32), corrected: p_0 is in the denominator."""
         lift = math.fsum(p * r for p, r in zip(self.weights, self.thresholds, strict=True))
         return 2.0 * lift / self.slopes[-1] if self.slopes[-1] else math.inf
 
@@ -147,7 +147,7 @@ class PlaySum:
         return np.asarray(excess @ np.asarray(self.weights))
 
     def inverse_problems(self) -> list[str]:
-        """Why there is no inverse; empty when there is one. Every `C_i` has to be positive."""
+        """Why there is no inverse; empty if there is one. Every `C_i` has to be positive."""
         return [
             f"the weights up to p_{i} sum to {c:.6g}, the inverse needs a positive sum"
             + (" (p_0 > 0)" if i == 0 else "")
@@ -156,7 +156,7 @@ class PlaySum:
         ]
 
     def inverse(self) -> Self:
-        """The analytic inverse, another play sum with thresholds z (36), weights q (37) and the start memory mapped.
+        """The analytic inverse, a play sum with thresholds z (36), weights q (37) and the start memory mapped to it.
 
         Raises NotInvertibleError.
         """

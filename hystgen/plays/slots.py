@@ -1,4 +1,4 @@
-"""Numbers that the bit reference shares with the C: places in the arrays of limits, status bits and calls."""
+"""Numbers that the bit reference shares with the C: indices into the array of limits, status bits and calls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Reals = NumberArray
 Counts = NumberArray
 Bytes = NDArray[np.uint8]
 
-# arithmetic-independent names for places in the arrays below
+# indices into `limits`, the same in every arithmetic
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
 HOLD, REAL_MAX, ZERO = 7, 8, 9
 
@@ -26,22 +26,22 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
-# the bits of a call that identify it, and one that leaves its status bits for a later call to read with its own
+# the bits that identify a call, and a bit that leaves its status for a later call to read together with its own
 OP_CALL, OP_UNREAD = 127, 128
-# more places in `limits`, of fixed point
+# further indices into `limits`, only in fixed point
 PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)
 
 
 class StepState(Struct):
-    """The memory of one operator besides its plays; each engine needs a part of it."""
+    """The memory of one operator apart from its plays; each engine uses a part of it."""
 
     pending: Real  # drive sent but not yet part of the memory
     drive: Real  # seen last
-    undo_drive: Real  # the same before the last step
+    undo_drive: Real  # `drive` before the last step
     before: Real  # input of the plays before the last step
-    returned: Real  # by the last step, if another drive was committed since
+    returned: Real  # by the last step, if another drive has been committed since
     reference: Real  # of the last step
-    last: Real  # the same, limited: the next reference moves up or down from here
+    last: Real  # `reference`, limited: the next reference rises or falls from here
     next: Real  # input or output at which another play begins to follow
     level: Real  # sum of the plays
     answer: Real  # returned last
@@ -49,20 +49,20 @@ class StepState(Struct):
     undo_ascending: Flag
     has_pending: Flag
     stepped: Flag  # a step has answered
-    committed: Flag  # a drive was committed since
-    repeated: Flag  # the last answer still stands for `reference`
+    committed: Flag  # a drive has been committed since
+    repeated: Flag  # the last answer is still valid for `reference`
     usual: Flag  # in the last step the same plays followed
-    sought: Flag  # a solution has been found since the plays followed
+    sought: Flag  # a solution has been found since the plays last followed
     bits: UInt32  # status of the last answer
     status: UInt32
 
 
 def firsts(lengths: Iterable[int]) -> Counts:
-    """Where lists of these lengths begin in a row of all, and where the last one ends."""
+    """Where lists of these lengths begin when stored one after another, and where the last one ends."""
     return np.cumsum([0, *lengths]).astype(np.int64)
 
 
 @jit(inline=True)
 def zero(x: N) -> N:
-    """0 of the type of a finite x."""
+    """0 in the type of x, which is finite."""
     return x - x

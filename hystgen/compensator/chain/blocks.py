@@ -11,7 +11,7 @@ from hystgen.effects.part import ChainPart
 
 
 def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") -> list[Constants]:
-    """The blocks of an operator that belong to some parts of the chain."""
+    """The blocks of an operator that belong to the given parts of the chain."""
     every = parts_with(*t.own_blocks, t.own_effects) if isinstance(t, OwnChainTables) else PARTS
     pairs = [(every[k], t.blocks[k]) for k in map(PARTS.index, parts)]
     return [
@@ -21,17 +21,17 @@ def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") ->
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
-    """The blocks of an operator: those in front of the plays, from the drive on, and those behind them."""
+    """The blocks of an operator: those in front of the plays, starting at the drive, and those behind them."""
     return of(t, AHEAD, operator), of(t, BEHIND, operator)
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
-    """The blocks of both sides, the plays that rub, and the clock of a drift."""
+    """The blocks on both sides, plays that generate heat by friction, and the clock of a drift."""
     return [*of(t, (*AHEAD, *BEHIND), operator), *(each for each in rubbing(t) if each), *clocks(t)]
 
 
 def rubbing(t: ChainTables) -> list[Constants | None]:
-    """For each block of own heat, the plays whose friction warms it, or None if the square of the drive does."""
+    """For each block of own heat, the plays whose friction heats it, or None if the square of the drive does."""
     pairs = zip(PARTS, t.blocks, strict=True)
     return [each for part, tables in pairs for each in part.of(t).beside(tables)]
 

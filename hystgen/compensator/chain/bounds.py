@@ -2,16 +2,16 @@
 
 Every block adds the roundings of its own operations to the error that reaches it, and passes the sum on with its
 largest gain from sample to sample. Limiting a drive to its range or committing one, in one computation or in both,
-never increases their difference: limiting is not expansive, and both absorb the applied drive. A slew limit leaves
+never increases their difference: limiting is nonexpansive, and both absorb the applied drive. A slew limit leaves
 drives as far apart as they were, while a lag in front of the plays follows them; with both, only the range of the drive
-bounds the errors behind, and `rounding` excludes that.
+bounds the errors behind them, and `rounding` excludes that case.
 
-Inverse. The reference less its offsets passes through saturation (slope at the ends of the output), the taps (sum of
-their sizes) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an output error on to its input, and
-from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the states' share of
-the previous input, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. Plays are as in `hystgen.compensator.bounds`. The
-lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1 - theta)`: the previous target
-counts too, even if a limit has shifted it. A user's own block is as in `hystgen.compensator.chain.own`.
+Inverse. The reference minus its offsets passes through saturation (slope at the ends of the output), the taps (sum of
+their absolute values) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an output error on to its
+input, and from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the
+states' share of the previous input, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. For plays see
+`hystgen.compensator.bounds`. The lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1
+- theta)`: the previous target counts too, even if a limit has shifted it. For a user's own block see `own`.
 
 States that move by less than their last bit are kept in two parts. Their roundings are proportional to their steps, so
 they add up to a few units of the state however slow it is; roundings of the second part add up to `u^2/rate` of it.
@@ -39,12 +39,12 @@ from hystgen.plays import slots
 SAME = "both have seen the same drives"
 
 STILL = "the drive does not stand still"
-"""Condition of a quiet drive in front of a lag: the arriving signal is then within twice its dither of the target."""
+"""Condition for a quiet drive in front of a lag: the arriving signal is then within twice its dither of the target."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _Sizes:
-    """Largest sizes: drive, sum of the plays, output behind creep, displacement with all settings."""
+    """Largest magnitudes: drive, sum of the plays, output behind creep, displacement with all settings."""
 
     drive: float
     plays: float
@@ -64,7 +64,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
 
 
 def _mapped(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
-    """Maps of the output: the slope of their inverse at its ends, the roundings of the inverse as errors of its result,
+    """Maps of the output: the slope of their inverse at its ends, the roundings of the inverse in terms of its result,
     and the roundings of the maps."""
     limits = compiled.tables.limits
     ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
@@ -86,7 +86,7 @@ def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
     """Errors of plays that an effect moves or bends: roundings of a play as a shift of its input, roundings of the sum,
-    and error of the sum because a search stops near it or at a finite width.
+    and the error of the sum because a search stops near it or at a finite width.
 
     `emitted`: include the approximations of the C, which double precision does not make.
     """
@@ -109,16 +109,16 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
         stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
         play = 8.0 * u * size + stretched
         if emitted:
-            play += float(t.number[SEEN]) * way  # where the input counts as standing still
+            play += float(t.number[SEEN]) * way  # below this the input counts as standing still
     most, width = float(np.sum(p)) * steep, 3.0 * (high - low) * 2.0**-t.halves
     return play, summed, most * u * size + max(most * width, float(t.number[CLOSE]))
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
-    """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for.
+    """Errors of the forward operator's displacement, and of the play sum that the inverse asks for.
 
-    They hold for one arithmetic and leave out the plays' own errors; `emitted` as for `_moving`; `same`: the
-    compensators' states have seen the same drives.
+    They apply to one arithmetic and exclude the plays' own errors; `emitted` as for `_moving`; `same`: the states of
+    both compensators have seen the same drives.
     """
     u = float(np.finfo(kind).eps) / 2
     sizes = _sizes(compiled)
@@ -133,12 +133,12 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     ahead, behind, ones = ahead_of(compiled.ones), compiled.behind, compiled.ones
     moved = max((one.rounding(sizes.drive, u)[0] for part in SENT for one in ones[part.name]), default=0.0)
     moved += _slewed(compiled, kind)
-    if not emitted:  # in double precision each slew-limited step is rounded
+    if not emitted:  # in double precision every slew-limited step is rounded
         moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
     moved += sum(one.rounding(sizes.drive, u)[0] for one in ahead)
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
-    if emitted and ahead and static.branches_differ:  # the input of the front may come to rest on either branch
+    if emitted and ahead and static.branches_differ:  # the front's input may come to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
     given = sizes.plays * np.cumprod([1.0, *(one.growth for one in behind)])
     for one, size in zip(behind, given.tolist(), strict=False):
@@ -154,7 +154,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
 
 
 def _led(compiled: Compiled, error: float, u: float, same: bool) -> float:
-    """The error of the drive for an error in front of the plays; `same` as for `_one`."""
+    """The error of the drive that results from an error in front of the plays; `same` as for `_one`."""
     drive, turning = _sizes(compiled).drive, bool(compiled.tables.turning)
     for one in reversed(ahead_of(compiled.ones)):
         error = one.led(error, drive, u, same, turning)
@@ -168,30 +168,30 @@ def _seen(compiled: Compiled) -> float:
 
 def _kept(compiled: Compiled) -> float:
     """How far the input of the plays can be from its target while the drive stands still. Also how far a drive that
-    keeps a lag on its branch can be from the state of that lag, which the model in double precision keeps it at."""
+    keeps a lag on its branch can be from the lag's state, at which the model in double precision keeps the drive."""
     return 2.0 * float(compiled.tables.number.dither[0])
 
 
 def _slewed(compiled: Compiled, kind: str) -> float:
-    """How far a slew-limited drive can be from an exact one, in drive units: roundings of the drive, of the previous
-    one where it is committed, and of the rate, accumulated while the drive crosses its range."""
+    """How far a slew-limited drive can be from the exact drive, in drive units: roundings of the drive, of the previous
+    drive if it was committed, and of the rate, accumulated while the drive crosses its range."""
     steps = crossing(compiled.static, compiled.parts, compiled.seconds)
     u = float(np.finfo(kind).eps) / 2
     return _sizes(compiled).drive * (3.0 * u * (steps > 0.0) + steps * 2.0 * u * u)
 
 
 CELLS = 4096
-"""[parts of the drive's range] Grid on which the miss of a kept branch is bounded; each cell adds at most its width,
-2e-4 of the range, to the kept way."""
+"""[parts of the drive's range] Grid for bounding the error of a drive that keeps its branch; each cell adds at most its
+width, 2e-4 of the range, to the distance kept."""
 
 
 def kept_branch(compiled: Compiled) -> float:
     """Largest distance of the displacement at rest from its reference, in output units, because a drive in front of two
-    branches keeps its own.
+    branches stays on its branch.
 
-    The drive stays put for up to a lag's share theta of the way to the other branch, plus the step back that rounding
-    may cause, `limits[HOLD]`, beyond a target that itself has half of that rounding. Both branches rise between grid
-    points, so their values there bound all values in between.
+    The drive stays put up to a lag's share theta of the distance to the other branch, plus the step back that rounding
+    may cause, `limits[HOLD]`, beyond a target that itself has half of that rounding error. Both branches rise between
+    grid points, so their values there bound all values in between.
     """
     static, t = compiled.static, compiled.tables
     theta = ahead_of(compiled.ones)[0].second if t.turning else 0.0
@@ -214,8 +214,8 @@ def kept_branch(compiled: Compiled) -> float:
 
 
 def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
-    """How far a drive at rest may swing, in drive units, because a user's own blocks lead it from one of two branches
-    to the other; 0 if it comes to rest."""
+    """How far the drive may swing at a constant reference, in drive units, because a user's own blocks lead it back and
+    forth between two branches; 0 if it comes to rest."""
     if not static.branches_differ or not parts.own_drives:
         return 0.0
     gain = lead(ahead_of(parts.ones(seconds)))
@@ -224,14 +224,14 @@ def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
 
 
 def condition(compiled: Compiled) -> str:
-    """The condition of `rounding` in words, if only the range bounds the difference of two drives; else "".
+    """The condition of `rounding` in words, if only the range bounds the difference between two drives; else "".
 
-    A led lag misses its target by a second difference, so the plays and creep behind it see something else than was
-    solved for; their memory then differs between two drives, and the lead amplifies that. So does a user's own block in
-    front while the drive is limited: its memory of an earlier difference moves plays that the same drive would have
-    moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A braked lag behind a
-    slew limit gives up more of its lead than the limit cuts off. In front of two branches a lag stays where it is
-    rather than turn, which depends on the drives that it has seen.
+    A led lag misses its target by a second difference, so the plays and creep behind it see a signal other than the one
+    solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block in
+    front while the drive is limited: its memory of an earlier difference moves plays differently that the drive alone
+    would move alike. Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag
+    behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays
+    or turns depends on the drives that it has seen.
     """
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
@@ -243,7 +243,7 @@ def condition(compiled: Compiled) -> str:
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
-    """Bounds for `arithmetic` 'float32' or 'float64', if only gains and temperatures are set from outside."""
+    """Bounds for `arithmetic` 'float32' or 'float64', provided the caller sets only gains and temperatures."""
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     plays = error_bounds(static, arithmetic, engines.ENGINES[compiled.tables.plays.engine])
     pi = static.pi
@@ -254,7 +254,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         gain = (1.0 / pi.weights[0] if same else whole_gain) / static.front_slopes[0]
         at_once = gain * static.front_slopes[0] / whole_gain  # for plays with the same memory, as `rounding` states
         plays = dataclasses.replace(plays, rounding=plays.rounding * at_once)
-    only_seen = 0.0  # error of the sum that the inverse undoes; only creep behind plays with a limited drive sees it
+    only_seen = 0.0  # error of the sum that the inverse undoes; only creep behind plays with a limited drive feels it
     if compiled.tables.moving.used:
         least = moving.least_slope(static, compiled.parts.plays) * (1.0 if same else 0.5)
         if compiled.tables.moving.moves == DILATED:
@@ -274,7 +274,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     whole = static.input_range[1] - static.input_range[0]
     seen = 1.0 if same else _seen(compiled)
     kept = _slewed(compiled, arithmetic) + _slewed(compiled, "float64")
-    if compiled.tables.quiet and not same:  # the plays have seen the drive that was kept
+    if compiled.tables.quiet and not same:  # the plays have seen the drive that stood still
         kept += _kept(compiled)
     if kept > 0.0:
         apart = gain * pi.slopes[-1] * static.front_slopes[1] * kept

@@ -34,7 +34,7 @@ def keep(to: Reals, kink: Kink) -> None:
 
 @jit
 def start(t: FixedChainTables, s: ChainState, zero: int) -> None:
-    """Set the plays to the start memory, or all to 0; only their positions are known then."""
+    """Set the plays to the start memory, or all to 0; this sets only their positions."""
     m: FixedMemory = s.corners
     corners_fixed.start(t.plays, m, t.plays.zero if zero else t.plays.start)
     for i in range(4):
@@ -52,7 +52,7 @@ def started(t: FixedChainTables, s: ChainState) -> int:
 
 @jit
 def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: int) -> bool:
-    """Move the plays to an input between the kink and the next one. Returns False if the input lies elsewhere."""
+    """Move the plays to an input between `kept` and the next kink. Returns False if the input lies elsewhere."""
     kink = (kept[0], kept[1], kept[2], kept[3])
     moved = gained(t, m, kink, w)
     if moved < 0 or kink[0] + moved > m.step.next[0]:
@@ -63,14 +63,14 @@ def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: int) -> bool:
 
 @jit
 def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: int) -> bool:
-    """Move the plays to any input between this kink and the next one, which it finds."""
+    """Move the plays to any input between `kept` and the next kink, which it finds."""
     m.step.next[0] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
     return move_on(t, m, kept, w)
 
 
 @jit
 def follow(t: FixedChainTables, s: ChainState, w: int) -> int:
-    """Move the plays with their input w. Returns their sum."""
+    """Move the plays to input w. Returns their sum."""
     m: FixedMemory = s.corners
     if s.own.inverse[0]:
         there = m.step.sought[0] != 0 and moved(t.plays, m, s.kink, w)
@@ -87,7 +87,7 @@ def follow(t: FixedChainTables, s: ChainState, w: int) -> int:
 
 @jit
 def seen(t: FixedChainTables, m: FixedMemory, kept: Reals, w: int) -> None:
-    """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
+    """Note the kink before a solution w to be refined: plays that begin to follow at w itself do not count."""
     x = along(m, w)
     if t.number.arriving_bits[0] > 0 and along(m, m.here.input[0]) < x <= kept[1]:
         keep(kept, find(t.plays, m, x - 1, False))
@@ -106,7 +106,7 @@ def inverse_input(t: FixedChainTables, s: ChainState, h: int) -> int:
 
 @jit
 def finer(t: FixedChainTables, s: ChainState, h: int, w: int, a: int) -> int:
-    """As in engine loop: the signal in front of the plays that gives their sum h, with more bits than their input w."""
+    """As in engine loop: the signal in front of the plays that makes their sum h, with more bits than their input w."""
     bits = t.number.arriving_bits[0]
     if bits == 0:
         return a

@@ -49,7 +49,7 @@ def move_on(t: Curve, m: Memory, w: Scalar) -> bool:
 
 @jit
 def follow(t: FloatChainTables, s: ChainState, w: Scalar) -> Scalar:
-    """Move the plays with their input w. Returns their sum."""
+    """Move the plays to input w. Returns their sum."""
     m: Memory = s.corners
     if not s.own.inverse[0]:
         return plays_step(t.plays.forward, m, w)

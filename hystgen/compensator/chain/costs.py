@@ -12,13 +12,13 @@ OWN = {
     "preview": "inverse", "quiet": "inverse", "slew": "", "braked": "", "tanh": "", "dead_zone": "", "relaxing": "",
     "dilated": "", "dashpot": "", "polynomial": "", "centre": "",
 }
-"""Parts of the code beside those of blocks, each with the only operator that has it, if there is one: `dilated` for all
-plays whose input is found by a search, `braked` for a block together with a slew limit, `quiet` for a drive that stands
-still at rest."""
+"""Parts of the code other than those of blocks, with the operator if only one has the part: `dilated` for all plays
+whose input is found by a search, `braked` for a block together with a slew limit, `quiet` for a drive that stands still
+at rest."""
 
 PARTS = ("any", *(each for part in parts.PARTS for each in part.code), *OWN)
-"""All parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, each other part once
-for its kind of block."""
+"""All parts of the code: `any` (with engine corners `any_corners`) once per model with effects, every other part once
+per kind of block."""
 
 OPERATORS = {each: "forward" for part in parts.PARTS if part.forward for each in part.code} | {
     each: operator for each, operator in OWN.items() if operator
@@ -26,7 +26,7 @@ OPERATORS = {each: "forward" for part in parts.PARTS if part.forward for each in
 """Parts that only one operator has."""
 
 PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
-"""Parts that move or bend plays: their cost per sample grows with the number of plays."""
+"""Parts that move or bend plays, whose cost per sample grows with the number of plays."""
 
 
 def found(t: ChainTables, operator: str) -> list[str]:

@@ -3,14 +3,14 @@
 As in `hystgen.compensator.chain.bounds`, every block adds the roundings of its own operations and constants to the
 error that reaches it, and passes the sum on with its largest gain. Every operation rounds signals to their last bit and
 states to lower bits; a state keeps each rounding for 1/rate samples. The drive is rounded to a code and absorbed as
-sent: the plays see that rounding, or `rate/2` codes of it behind a lag. Errors are in units of signals in front of the
-plays and in output codes behind them.
+sent: the plays see that rounding error, or `rate/2` codes of it behind a lag. Errors are in units of signals in front
+of the plays and in output codes behind them.
 
-A led lag misses its target by a second difference, so plays behind it see something else than was solved for: their
-memory differs between two drives, and the lead amplifies that up to the range of the drive. A user's own block in front
+A led lag misses its target by a second difference, so plays behind it see a signal other than the one solved for: their
+memories differ for two drives, and the lead amplifies that up to the range of the drive. A user's own block in front
 has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double precision
-that has seen the same drives. Behind a memoryless part it holds only while nothing is limited, since there a lag cannot
-be led beyond the drive's range.
+that has seen the same drives. With a memoryless part it holds only while nothing is limited, since a lag in front of it
+cannot be led beyond the drive's range.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ DOUBLE = 2.0**-40
 
 @dataclass(frozen=True)
 class Sizes:
-    """Largest sizes of the signals behind the plays, in output codes.
+    """Largest magnitudes of the signals behind the plays, in output codes.
 
     Forwards: the sum of the plays, the input of each block (`given`, by part) and of each map of the output (`mapped`),
-    and the output. Backwards: the reference after the inverse of each map, the least and largest input to which a curve
-    inverts it (`inverted`), the target of the output side, the output wanted from each block (`wanted`), and the sum
+    and the output. Backwards: the reference after the inverse of each map, the least and largest input that a curve
+    returns for it (`inverted`), the target of the output side, the output asked of each block (`wanted`), and the sum
     asked of the plays.
     """
 
@@ -68,7 +68,7 @@ class Sizes:
 
     @property
     def largest(self) -> float:
-        """The largest of them."""
+        """The largest of all these."""
         blocks = (size for sizes in (*self.given.values(), self.wanted["own_behind"]) for size in sizes)
         forwards = (self.plays, *blocks, *self.mapped, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
@@ -76,7 +76,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Bend:
-    """A curve of a map; its arguments leave out `drop` bits of a signal, its values `lift` bits."""
+    """A curve of a map; its arguments omit `drop` bits of a signal, its values `lift` bits."""
 
     curve: FixedCurve
     drop: int
@@ -93,9 +93,9 @@ class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
     `formats`: the blocks of each part; `bends`: the curve and inverse curve of each map that has them; `ends`: range of
-    the output; `slewed`: error of a slew-limited drive by rounding, in drive codes; `reached`: whether the block in
-    front can be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in
-    front of the plays below their input; `bumps`: curves of bent plays.
+    the output; `slewed`: rounding error of a slew-limited drive, in drive codes; `reached`: whether the block in front
+    can be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front
+    of the plays below their input; `bumps`: curves of bent plays.
     """
 
     static: StaticModel
@@ -118,7 +118,7 @@ class Bounds:
 
     @property
     def drifted(self) -> float:
-        """Error of all drifts, in units of signals."""
+        """Total error of all drifts, in units of signals."""
         return float(sum(each.error for each in self.formats["clock"]))
 
     @property
@@ -149,14 +149,14 @@ class Bounds:
         return ahead_of(self.formats)
 
     def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
-        """Blocks behind the plays in the `forward` operator or in the inverse, each with its input size and its gain,
-        if any."""
+        """Blocks behind the plays in the `forward` operator or in the inverse, each with its largest input and its
+        gain, if any."""
         parts = [part.name for part in BEHIND if forward or not part.forward]
         speed = Speed(self.static.input_range, self.largest_step, self.seconds)
         lsb = float(self.inner.output_lsb)
         coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
         found: list[tuple[Coded, float, CodedGain | None]] = []
-        reached = 0.0  # by gains so far: its ends are nearer than the sizes that signals have room for
+        reached = 0.0  # largest input of the gains: the output's ends are nearer than the sizes that signals can hold
         for name in parts:
             for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):
                 gain = each.gain(reached or size, speed, coding)
@@ -177,8 +177,8 @@ class Bounds:
     # ------------------------------------------------------------ operators
 
     def _arrival(self) -> tuple[float, float]:
-        """Roundings of the signal in front of the plays, given the drive as sent, and its change by rounding the drive
-        to a code, both in units of signals."""
+        """Roundings of the signal in front of the plays for the drive as sent, and how much rounding the drive to a
+        code changes that signal, both in units of signals."""
         here = sum(each.arrived for each in self._ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
@@ -211,7 +211,7 @@ class Bounds:
         """Error of the sum of plays that an effect moves or bends, in codes, and the part of it that the inverse
         undoes.
 
-        It comes from rounding, and from contacts within a step in which the plays' input moves by `way`.
+        Its causes are rounding, and contacts within a step in which the plays' input moves by `way`.
         """
         t = self.tables.moving
         if not t.used:
@@ -236,8 +236,8 @@ class Bounds:
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
     def _dashpot(self, step: float, way: float) -> float:
-        """How far plays with a nonlinear dashpot can be from the model's: by the table, and by treating the input as
-        standing still within a step."""
+        """How far plays with a nonlinear dashpot can be from those of the model because of the table, and because a
+        slow input is treated as standing still within a step."""
         t = self.tables.moving
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
         return yield_error(t, self.static, self.parts.plays, self.seconds, step, way) + seen * way
@@ -253,8 +253,8 @@ class Bounds:
         return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
-        """Error of the sum of the plays, in output codes, for an error before the memoryless part; `way`: by default
-        `_way`."""
+        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way`: by
+        default `_way`."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         moved, _ = self._moved(self._way if way is None else way)
@@ -275,7 +275,7 @@ class Bounds:
         return upward(Fraction(SECOND_ORDER * (error + beside) + DOUBLE * self.sizes.output))
 
     def _asked(self) -> float:
-        """Error of the sum that the inverse asks of the plays, in output codes."""
+        """Error of the play sum that the inverse asks for, in output codes."""
         _, slope, back, _ = self._mapped()
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
         limits = self.tables.limits
@@ -295,19 +295,19 @@ class Bounds:
         return error
 
     def _residual(self, way: float, solved: float) -> float:
-        """Error of the sum of the plays at the input that the inverse finds, in output units, for an error `solved` of
-        that input in units of signals; `way` as `_way`."""
+        """Error of the sum of the plays at the input that the inverse finds, in output units, given an error `solved`
+        of that input in units of signals; `way` as `_way`."""
         missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
-        for each, *_ in self._behind(False):  # their states have seen the sum of the plays
+        for each, *_ in self._behind(False):  # whose states have seen the sum of the plays
             missed_by = each.residual(missed_by, bool(self.condition))
         return self._asked() * float(self.inner.output_lsb) + missed_by
 
     def _solution(self) -> float:
         """Rounding of the plays' input as solved for, in units of signals.
 
-        With bits below that input, the remainder of the sum is divided by the slope of the plays that follow up to it.
-        More plays may follow in the rest of a step: the slope is then too small, by a factor down to `p_0/sum p`, and
-        any result beyond a step is cut off.
+        If signals have bits below that input, the remainder of the sum is divided by the slope of the plays that follow
+        up to the input. More plays may begin to follow within the next step of the input: the slope used is then too
+        small, by a factor down to `p_0/sum p`, and any result beyond that step is cut off.
         """
         t, step = self.tables.moving, float(self.inner.step)
         solution = 1.5 * step if t.used and not t.scanned else float(self.inner.solved())
@@ -322,12 +322,12 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         solved = self._solution() + steep * float(self.inner.back())
         apart = sum(code) + short + self.slewed * 2.0**self._fine
-        solved += steep * (code[0] if self.condition else apart)  # both have seen it, or not
+        solved += steep * (code[0] if self.condition else apart)  # both have seen the same drive, or not
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
-        """Error of the inverse's answer, without the part that it undoes; under a `condition` plays hold the same, and
-        the answer is off by its own rounding."""
+        """Error of the inverse's answer, without the part that it undoes; under a `condition` the plays are the same,
+        and the answer is off only by its own rounding."""
         if not self.condition:
             undone = self._moved(way)[1] * float(self.inner.output_lsb)
             return self._arriving_error(way) - self._gain() * undone / self._arriving
@@ -346,8 +346,8 @@ class Bounds:
         return 1.0 / least / self.static.front_slopes[0]
 
     def _gain(self) -> float:
-        """As `_gain_at_once`, for plays that have each seen the drives of their own compensator."""
-        if self.tables.moving.moves == DILATED:  # bounds as at once; drives that are held may be farther apart
+        """As `_gain_at_once`, for plays that have seen only the drives of their own compensator."""
+        if self.tables.moving.moves == DILATED:  # bounds as at once; held drives may be farther apart
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
@@ -359,7 +359,7 @@ class Bounds:
         return float(self.inner.gain())
 
     def _led(self, error: float) -> float:
-        """The error of the drive for an error in front of the plays, both in units of signals."""
+        """The error of the drive that results from an error in front of the plays, both in units of signals."""
         turning = bool(self.tables.turning)
         for each in reversed(self._ahead):
             code = 0.5 * 2.0**self._fine if each is self._ahead[0] else 0.5
@@ -367,21 +367,21 @@ class Bounds:
         return error + 2.0 * float(self.tables.number.dither[0]) * turning
 
     def _codes(self, error: float) -> float:
-        """The error of the drive in drive codes, for an error in front of the plays in units of signals."""
+        """The error of the drive, in drive codes, for an error in front of the plays in units of signals."""
         own = SECOND_ORDER * self._led(error + self._kept) / 2.0**self._fine
         whole = float(self.inner.drive[1] - self.inner.drive[0])
         return upward(Fraction(min(own + DOUBLE * whole, whole)))
 
     def hold(self) -> int:
-        """Longest step back of the drive that can come from rounding alone, in units of signals."""
+        """Longest step back of the drive that rounding alone can cause, in units of signals."""
         if not self.static.branches_differ or not self.inner.invertible:
             return 0
-        # contacts within a step move drives, but do not turn them
+        # contacts within a step shift drives but do not make them turn
         return math.floor(2.0 * (self._found_error(0.0) if self.condition else self._arriving_error(0.0)))
 
     @property
     def condition(self) -> str:
-        """The condition of `rounding` in words, if only the range bounds the difference of two drives; else ""."""
+        """The condition of `rounding` in words, if only the range bounds the difference between two drives; else ""."""
         missed = any(each.one.misses for each in self._ahead)
         dilated = self.tables.moving.moves == DILATED
         if not (missed or dilated or (self.formats[NAMES[LED]] and (not self.reached or self.parts.slew))):
@@ -397,11 +397,11 @@ class Bounds:
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
-        """Error of the drive's limits, for a limited drive and the one before it, because drives are whole codes."""
+        """Error of the drive's limits because drives are whole codes, for a limited drive and the previous one."""
         return upward(max(self.inner.drive_short() / self.inner.drive_lsb, Fraction(2.0 * self.slewed)))
 
     def inverse(self) -> float:
-        """Bound of the inverse in drive codes, including another branch and limits."""
+        """Bound of the inverse in drive codes, including the effect of another branch and of limits."""
         if self.condition:
             return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:

@@ -1,10 +1,10 @@
-"""Fixed-point form of a model with effects: signals, ranges and constants as whole numbers.
+"""Fixed-point form of a model with effects: signals, ranges and constants as integers.
 
 Signals in front of the plays are in units of the plays' input, which is a drive code or finer; signals behind the plays
 have `LEVEL_BITS` bits below an output code. Every signal is bounded here, by intervals propagated forwards from the
-drive and backwards from the reference, and gets as many bits as still let a product take it (`LARGEST`). States of
-filters get enough further bits to keep the slowest state from stalling. No sum or product can overflow, in whatever
-order calls are made; a model that does not fit is refused.
+drive and backwards from the reference, and gets as many bits as a product can take (`LARGEST`). States of filters get
+enough additional bits to keep the slowest state from stalling. No sum or product can overflow, in whatever order calls
+are made; a model that does not fit is refused.
 """
 
 from __future__ import annotations
@@ -63,17 +63,17 @@ from hystgen.plays.slots import Reals
 M = TypeVar("M")
 
 TEMPERATURE_BITS = {15: 7, 31: 22}
-"""Fraction bits of a temperature in degC, by the bits of a code: the range is +-256 or +-512 degrees."""
+"""Fraction bits of a temperature in degC, by the width of a code in bits: the range is +-256 or +-512 degrees."""
 
 BEYOND = 7
-"""Most spans beyond its range that the input of plays behind a lag may be asked for: 8 spans of 2^26 steps and a sign
-fit in 32 bits."""
+"""Maximum number of spans beyond its range that may be asked of the input of plays behind a lag: 8 spans of 2^26 steps
+and a sign fit in 32 bits."""
 
 MOST_FINER = 16
-"""Most bits of a signal in front of the plays below their input: division by a 31-bit slope then still fits in 64."""
+"""Maximum bits of a signal in front of the plays below their input: division by a 31-bit slope then fits in 64 bits."""
 
 BEND_BITS = 30
-"""Bits of the arguments and values of a curve, without their sign."""
+"""Bits of the arguments and values of a curve, excluding their sign."""
 
 
 def build(
@@ -228,16 +228,16 @@ class _Builder:
         return output_range(self.static, dataclasses.replace(self.parts, maps=[]), self.seconds)
 
     def _beyond(self) -> tuple[int, bool]:
-        """Spans beyond its range that the input of the plays has to be asked for, and whether they all can be.
+        """Spans beyond its range that the plays' input needs, and whether that many can be asked for.
 
-        A lag is led past its range and keeps moving; behind a memoryless part there is nothing beyond the range.
+        A lag is led past its range and keeps moving; a memoryless part passes nothing beyond the range.
         """
         if self.static.stages:
             return 0, False
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent plays are straight outside
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent plays are linear outside
         return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants
@@ -249,7 +249,7 @@ class _Builder:
 
     def _moving(self, plays: FixedTables) -> FixedMovingTables:
         step = float(self.inner.step)
-        farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still answer with the input beyond
+        farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still return the input beyond it
         return moving.build_fixed(
             plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
@@ -268,7 +268,7 @@ class _Builder:
         """The limits of the whole chain."""
         limits = np.array(plays)
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
-        slack = Fraction(1, 1024)  # double precision may have moved an end off a code by this much
+        slack = Fraction(1, 1024)  # rounding in double precision may have moved an end off its code by this much
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
         limits[slots.OFFSET] = 0
         most = self.about.code_max
@@ -299,13 +299,13 @@ class _Builder:
         return FixedChainNumbers.of([(*common, *levels, *codes, drive_bits, self.finer, braked)])
 
     def _largest_step(self) -> float:
-        """`Compiled.largest_step`, plus the code that a limited drive catches up at once."""
+        """`Compiled.largest_step`, plus the code by which a limited drive catches up at once."""
         low, high = self.static.input_range
         max_rate = fastest(self.static, self.parts, self.seconds, self.how)
         return min(max_rate * self.seconds + float(self.drive_lsb) * bool(self.parts.slew), high - low)
 
     def slew(self, span: int) -> list[int]:
-        """Whole drive codes that the drive may rise and fall in one step, then their fractions."""
+        """Whole drive codes by which the drive may rise and fall in one step, then their fractions."""
         if not self.parts.slew:
             return [0, 0, 0, 0]
         if self._slewed > MOST_SLEWED:
@@ -317,7 +317,7 @@ class _Builder:
 
     @property
     def _slewed(self) -> float:
-        """Rounding error in codes of a slew-limited drive after crossing its range."""
+        """Rounding error of a slew-limited drive after crossing its range, in codes."""
         return crossing(self.static, self.parts, self.seconds) * 2.0**-REST_BITS
 
     def _tables(self) -> tuple[object, ...]:
@@ -354,7 +354,7 @@ class _Builder:
         return tuple(found[name] for name in NAMES)
 
     def _behind(self, part: ChainPart) -> list[tuple[float, float]]:
-        """Largest input, and output asked for, of each block in output codes."""
+        """Largest input of each block and largest output asked of it, in output codes."""
         if part not in BEHIND:
             return [(0.0, 0.0)] * len(self.ones[part.name])
         return list(zip(self.sizes.given[part.name], self.sizes.wanted[part.name], strict=True))
@@ -375,7 +375,7 @@ class _Builder:
         return found
 
     def _finest(self) -> int:
-        """Further bits in front of the plays that keep rounding below half a code when the lags' lead amplifies it.
+        """Additional bits in front of the plays that keep rounding, amplified by the lags' lead, below half a code.
 
         0 for models with a memoryless part or effects on plays, and if the plays' input already has bits below a drive
         code.
@@ -425,7 +425,7 @@ class _Builder:
 
 
 def setting_codes(tables: ChainTables) -> tuple[float, float]:
-    """The change that sets one degree more, and the value that sets the gain 1: codes in fixed point."""
+    """The increment for one degree, and the value that sets the gain to 1; codes in fixed point."""
     if not tables.fixed:
         return 1.0, 1.0
     most = int(tables.limits[slots.CODE_MAX]) + 1

@@ -1,4 +1,4 @@
-"""Floating-point form of a model with effects: the numbers that its operators work with."""
+"""Floating-point form of a model with effects: the constants of its operators."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 ROUNDINGS = 4.0
-"""[half last bits of the largest drive] Rounding difference between the plays' input that is sought and the one that
-arrives: from a lag's goal and its state. Set by: tests/test_chain.py -k stands_still."""
+"""[half last bits of the largest drive] Rounding difference between the plays' input as solved for and as it arrives,
+from a lag's goal and its state. Set by: tests/test_chain.py -k stands_still."""
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
-    """The stages of maps of the output, each an envelope or three straight pieces."""
+    """The stages of maps of the output, each an envelope or three linear pieces."""
     dtype = ARITHMETICS[arithmetic].computed.type
     rows = [each.stage(float(np.nextafter(dtype(1), dtype(0)))) for each in parts.maps]
     kind, size = (np.array(each, dtype=np.int64) for each in ([row[0] for row in rows], [row[1] for row in rows]))
@@ -57,7 +57,7 @@ def _behind(parts: Parts, arithmetic: str) -> Stages:
 
 
 def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
-    """A nonnegative number as one of the arithmetic and the remainder that rounding removed; their sum is no larger."""
+    """A nonnegative number in the arithmetic and the remainder lost to rounding; their sum never exceeds the number."""
     whole = dtype(min(float(x), float(np.finfo(dtype).max) / 32))
     rest = dtype(float(x - Fraction(float(whole))))
     if Fraction(float(whole)) + Fraction(float(rest)) > x:
@@ -66,8 +66,8 @@ def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
 
 
 def slewed(steps: float, dtype: Any) -> float:
-    """Accumulated rounding of a slew-limited drive after so many steps, as a share of the range's end: per step half a
-    last bit of the remainder kept beside the drive, and half of the rate's."""
+    """Accumulated rounding of a slew-limited drive after this many steps, as a share of the range's end: per step, half
+    a last bit of the remainder kept with the drive and half a last bit of the rate's."""
     u = float(np.finfo(dtype).eps) / 2
     return steps * 2.0 * u * u
 
@@ -75,7 +75,7 @@ def slewed(steps: float, dtype: Any) -> float:
 def build(
     chain: Chain, arithmetic: str, seconds: float, how: Compensation, engine: str, drive_lsb: float | None
 ) -> Compiled:
-    """The model in 'float32' or 'float64' at steps of `seconds`; `drive_lsb`: code of the drive's converter.
+    """The model in 'float32' or 'float64' at steps of `seconds`; `drive_lsb`: step of the drive's converter.
 
     None of its effects is among the `tables.refusals`. Raises FormatError if a number does not fit the arithmetic.
     """

@@ -30,51 +30,51 @@ from hystgen.plays.slots import Counts, Reals
 
 
 class ChainNumbers(Struct):
-    """Numbers of a chain besides those of its plays and blocks."""
+    """Constants of a chain besides those of its plays and blocks."""
 
     output_offset: Real
-    farthest_offset: Real  # largest that may be set beside it
+    farthest_offset: Real  # largest offset that may be set in addition
     slew_rising: Real  # how far the drive may rise and fall in a step,
     slew_falling: Real
-    slew_rising_rest: Real  # and what rounding took from these
+    slew_rising_rest: Real  # and the remainders that rounding removed from these
     slew_falling_rest: Real
     share: Real  # by which verification corrects
     dither: Real  # how far a drive at rest dithers, as a signal in front of the plays
 
 
 class FixedChainNumbers(ChainNumbers):
-    """The same in fixed point."""
+    """The same in fixed point. `.._bits` and `.._drop`: bits of the first number below the last bit of the second."""
 
-    level_bits: UInt8  # of a signal behind the plays below an output code
-    level_drop: UInt8  # that a sum of the plays has below such a signal
+    level_bits: UInt8  # a signal behind the plays, an output code
+    level_drop: UInt8  # a sum of the plays, a signal behind them
     largest_level: Int64  # sum asked of the plays
     least_code: Int64  # of a drive before it is limited
     most_code: Int64
-    share_bits: UInt8  # of a mantissa below a code
-    drive_bits: UInt8  # of a signal in front of the plays below a drive code
-    arriving_bits: UInt8  # of such a signal below an input of the plays
-    braked_drop: UInt8  # that it has below the numbers in the search for the lead of a braked lag
+    share_bits: UInt8  # a mantissa, a code
+    drive_bits: UInt8  # a signal in front of the plays, a drive code
+    arriving_bits: UInt8  # a signal in front of the plays, their input
+    braked_drop: UInt8  # a signal in front of the plays, the numbers in the search for the lead of a braked lag
 
 
 TRAVEL_BITS = 16
 """In fixed point, verification sets travels in multiples of 2^16 drive codes."""
 
 REST_BITS = 30
-"""In fixed point, bits below a code of the rounding remainders of a slew-limited drive and of its rate."""
+"""In fixed point, bits below a code in the rounding remainders of a slew-limited drive and of its rate."""
 
 MOST_SLEWED = 16.0
-"""[last bits of the range's end] Most rounding that may accumulate while a slew-limited drive crosses its range; slower
-rates are refused. Derived: a bound of float32 is some 100 of them, so a tenth of it goes to the rate."""
+"""[last bits of the range's end] Maximum rounding accumulated while a slew-limited drive crosses its range; slower
+rates are refused. Derived: bounds of float32 are some 100 last bits, a tenth of which the rate may use."""
 
 VERIFIED_SHARE = 0.125
 """The share by which verification corrects: exact in every arithmetic."""
 
 LEAST_LATE = 1e-6
-"""[samples] Smaller delays count as none: mean ages are sums with rounding."""
+"""[samples] Smaller delays count as 0, since mean ages are sums with rounding errors."""
 
 SAMPLES_A_SWEEP = 50
-"""Fewest samples from one end of the drive's range to the other for which bounds are stated: a triangle at a hundredth
-of the sample rate keeps its shape, and errors by ageing and by contacts within a step are small."""
+"""Minimum number of samples from one end of the drive's range to the other for which bounds are stated: a triangle at a
+hundredth of the sample rate keeps its shape, and errors from ageing and from contacts within a step are small."""
 
 
 class Stages(NamedTuple):
@@ -101,8 +101,8 @@ class Stages(NamedTuple):
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
-    `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, whose limits are the same
-    in floating point; in fixed point their drive may have bits below a code; `behind`: maps of the output.
+    `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, with the same limits in
+    floating point; in fixed point their drive may have bits below a code; `behind`: maps of the output.
     """
 
     plays: Any  # narrowed by the two arithmetics, like the next ones
@@ -114,7 +114,7 @@ class ChainTables(NamedTuple):
     tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
     number: Any
     slew: int  # 1 if the rate of the drive is limited
-    quiet: int  # equal references after which the drive stands still, 0 if it never has to
+    quiet: int  # number of equal references after which the drive stands still, 0 if it never has to
     turning: int  # 1 if a lag must not arrive at two branches from the wrong side
 
     @property
@@ -132,7 +132,7 @@ class ChainTables(NamedTuple):
 
     @property
     def calls(self) -> set[str]:
-        """The calls that its blocks add to the interface."""
+        """The calls that the chain's blocks add to the interface."""
         return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
 
     @property
@@ -165,13 +165,13 @@ class FixedChainTables(ChainTables):
 
 
 class OwnChainTables(ChainTables):
-    """The tables of a model with a user's own effects: `own_sides` has their classes, ahead of the plays and behind."""
+    """The tables of a model with a user's own effects: `own_sides`: their classes, in front of the plays and behind."""
 
     own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
 
     @classmethod
     def with_own(cls, tables: ChainTables, parts: Parts) -> ChainTables:
-        """The tables of a model, with these classes if there are any."""
+        """The tables of a model, with the classes of a user's own effects if there are any."""
         if not (parts.own_drives or parts.own_outputs):
             return tables
         found = cls(*tables)
@@ -220,13 +220,13 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """shaped modes in the taps, besides a delay and inverted modes"""
+    """modes kept from ringing by the taps, which also have a delay and inverted modes"""
     codes: Codes | None = None
     """only in fixed point"""
 
     @property
     def largest_step(self) -> float:
-        """Largest move of the drive in a step for which the bounds hold."""
+        """Largest move of the drive per step for which the bounds hold."""
         low, high = self.static.input_range
         return min(self.max_rate * self.seconds, high - low)
 
@@ -237,7 +237,7 @@ class Compiled:
 
     @property
     def ahead(self) -> int:
-        """NAME_PREVIEW: as asked for, else as the model needs."""
+        """NAME_PREVIEW: as requested, else as the model needs."""
         return Read(self.taps, self.smoothing, self.shaped).ahead(self.asked)
 
     @property
@@ -252,7 +252,7 @@ class Compiled:
 
     @property
     def last(self) -> list[One]:
-        """The blocks behind these that only the forward operator has."""
+        """The blocks behind `behind`, which only the forward operator has."""
         return [one for part in BEHIND if part.forward for one in self.ones[part.name]]
 
     @cached_property
@@ -272,13 +272,13 @@ class Compiled:
 
 
 QUIET = 32
-"""[samples] Equal references after which the drive stands still. Set by: benchmarks/chosen_numbers.py quiet. Behind a
-lag of 10 samples in q15 a ramp of a code in 20 samples then arrives unchanged; with 8 it is missed by 0.088 codes (rms)
-instead of 0.077. With 128 a ramp of a code in 100 samples still dithers all the time, with 32 a third of it."""
+"""[samples] Equal references after which the drive stands still. Set by: benchmarks/chosen_numbers.py quiet. With a lag
+of 10 samples in q15, a ramp of one code per 20 samples is then unaffected; with 8 its rms error is 0.088 codes instead
+of 0.077. On a ramp of one code per 100 samples the drive dithers all the time with 128, a third of the time with 32."""
 
 
 def quiet(how: Compensation, taps: Taps | None) -> int:
-    """`ChainTables.quiet`: `QUIET`, plus one for each sample that the preview sums beside the first."""
+    """`ChainTables.quiet`: `QUIET`, plus one for each sample after the first that the preview sums."""
     return QUIET + (len(taps.weights) if taps else 1) - 1 if how.quiet else 0
 
 
@@ -288,7 +288,7 @@ def ahead_of(ones: Mapping[str, Sequence[Any]]) -> list[Any]:
 
 
 def lead(ahead: Sequence[One]) -> float:
-    """Largest gain from the signal in front of the plays to the drive, 0 if there are no blocks between them."""
+    """Largest gain from the signal in front of the plays to the drive, 0 if there are no blocks in between."""
     return math.prod(one.lead for one in ahead) if ahead else 0.0
 
 
@@ -306,13 +306,13 @@ def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
 
 
 def crossing(static: StaticModel, parts: Parts, seconds: float) -> float:
-    """Steps in which a drive at its limited rate crosses its range; 0 without a slew limit."""
+    """Steps that a drive at its limited rate takes to cross its range; 0 without a slew limit."""
     low, high = static.input_range
     return max((float(Fraction(high - low) / rate) for rate in rates(parts, seconds)), default=0.0)
 
 
 def too_slow(steps: float, arithmetic: str, finer: str) -> str:
-    """Message that refuses a rate at which the drive crosses its range in that many steps."""
+    """Message that refuses a rate at which the drive takes this many steps to cross its range."""
     return (
         f"slew_limit: the drive crosses its range in {steps:.2g} samples, too slow for {arithmetic}; use {finer}, or a "
         "longer sample_time"
@@ -320,21 +320,21 @@ def too_slow(steps: float, arithmetic: str, finer: str) -> str:
 
 
 HELD_CODES = 3
-"""[times DITHER] How far rounding alone takes a lag beyond its target in front of two branches: a drive is kept up to
-two ahead of it, and rounding that drive to a code adds half of one."""
+"""[times DITHER] How far rounding alone takes a lag in front of two branches beyond its target: the drive is kept up to
+two ahead of the target, and rounding it to a code adds half of one."""
 
 
 def hold(rounded: N, dither: N, turning: bool) -> N:
-    """Largest move back of the drive in front of two branches that does not count: from `rounded` computation, and from
-    drives that differ from those asked for."""
+    """Largest move back of the drive in front of two branches that is ignored: `rounded`, for rounded computation, plus
+    an allowance for drives that differ from those asked for."""
     return rounded + (HELD_CODES if turning else 1) * dither
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep; at most the rate of the amplifier, and
+    """NAME_MAX_RATE in drive units per second: as requested, else a slow sweep; at most the rate of the amplifier, and
     the rate at which own heat keeps the gain within its limits.
 
-    Beyond a slew limit the drive differs from the one given to the C, depending on when in a step it is reached.
+    Above the slew rate the actual drive differs from the one given to the C, depending on when in a step it is reached.
     """
     ends = static.input_range
     asked = how.max_rate or (ends[1] - ends[0]) / (SAMPLES_A_SWEEP * seconds)
@@ -346,15 +346,15 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
 
 def largest_way(static: StaticModel, ahead: Sequence[One], step: float) -> float:
     """Largest move of the plays' input in a step in which the drive moves by at most `step`: through a user's own
-    blocks `ahead`, up the steepest slope of the front and from one of its branches to the other. A lag adds nothing."""
+    blocks `ahead`, up the steepest slope of the front, and between its branches. A lag adds nothing."""
     grown = math.prod(one.growth for one in ahead)
     low, high = static.play_range
     return min(static.front_slopes[1] * grown * step + static.branch_gap, max(grown, 1.0) * (high - low))
 
 
 class Read(NamedTuple):
-    """How the reference is read: weights in the preview, None if it is taken unchanged, and the averages in them that
-    hold the noise gain and that keep modes from ringing."""
+    """How the reference is read: weights of the preview, None if it is taken unchanged, and the averages among them
+    that limit the noise gain and that keep modes from ringing."""
 
     taps: Taps | None
     smoothing: Smoothing | None
@@ -370,7 +370,7 @@ class Read(NamedTuple):
         return max(self.taps.ahead, 0) if self.taps else 0
 
     def missing(self, asked: int | None) -> int:
-        """Samples of `needed` that are not known ahead of the motion."""
+        """The part of `needed` that is not known ahead of the motion."""
         return max(self.needed - self.ahead(asked), 0)
 
     def late(self, asked: int | None) -> float:
@@ -399,7 +399,7 @@ def gain(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -
 
 
 def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
-    """The sum of the plays after their input has gone straight to w from the start memory."""
+    """The sum of the plays after their input has moved monotonically to w from the start memory."""
     pi = static.pi
     r = np.array(pi.thresholds)
     rows = np.clip(np.array(pi.start), w - r, w + r)[:, None]
@@ -411,7 +411,7 @@ def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
 
 
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
-    """Extremes of the settled output over every drive history inside the input range."""
+    """Extremes of the settled output over all drive histories within the input range."""
     low, high = (settled(static, parts.plays, end) for end in static.play_range)
     for one in parts.behind(seconds):
         low, high = one.at_rest(low), one.at_rest(high)

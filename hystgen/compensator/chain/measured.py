@@ -1,8 +1,8 @@
-"""The largest error of an inverse that a search finds, where the bound is the whole range of the drive.
+"""The largest error of an inverse found by a search, for models whose bound is the whole range of the drive.
 
-A lag that is led misses its target by a second difference, so the plays behind it remember something else than was
-solved for, and no sum of roundings says how far apart the drives of two arithmetics may come. The error found says what
-to expect, of references like these; it is no bound.
+A led lag misses its target by a second difference, so the memory of the plays behind it differs from the one solved
+for, and no sum of roundings tells how far apart the drives of two arithmetics may get. The error found is typical for
+references like these; it is not a bound.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 SAMPLES = 800
-"""[samples] Of each kind of reference. With 3000 the error found grows by a factor of at most 2.8, in eleven models of
-the tests without branches and three arithmetics, and an emission takes 1 s instead of 0.3."""
+"""[samples] Of each kind of reference. With 3000, the error found is at most 2.8 times as large, in eleven models of
+the tests without branches and three arithmetics, and an emission takes 1 s instead of 0.3 s."""
 
 SPEEDS = (1.0, 0.3, 0.1)
 """[shares of NAME_MAX_RATE] Slow references let roundings of a lag add up, fast ones move all plays."""
 
 SAID_BY = 10.0
-"""[times the error found] A bound farther from it than this says nothing and is left out. Asked of it: that a search
-comes within a tenth of each bound."""
+"""[times the error found] A larger bound is uninformative and is left out. Requirement: a search has to come within a
+factor of ten of each bound that is stated."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class Measured:
     samples: int
 
     def confirms(self, bound: float) -> bool:
-        """Whether a bound is near enough to the error found to say something."""
+        """Whether a bound is close enough to the error found to be informative."""
         return bound <= SAID_BY * self.error
 
 
 def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     """The largest error of the inverse against the compensator in double precision, from the start memory on, for
-    references over the whole range of the output: loops with straight legs and multisines at `SPEEDS`;
-    logged columns stay at the value at which an effect changes nothing."""
+    references over the whole range of the output: triangular loops and multisines at `SPEEDS`; logged columns stay at
+    the value at which their effect changes nothing."""
     t, codes = compiled.tables, compiled.codes
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
     ends = float(t.limits[slots.DRIVE_MIN]) * drive, float(t.limits[slots.DRIVE_MAX]) * drive
@@ -71,7 +71,7 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
 
 
 def _upward(x: float) -> float:
-    """x rounded up to two digits, which are the same whatever a machine's last bits of a tanh are."""
+    """x rounded up to two digits, so that the last bits of a machine's tanh do not show."""
     if x == 0.0:
         return 0.0
     digits = 1 - math.floor(math.log10(x))
@@ -79,8 +79,8 @@ def _upward(x: float) -> float:
 
 
 def _legs(step: float) -> Array:
-    """Loops in shares (0 .. 1) of a range: the whole of it, shrinking loops, then pseudo-random ones; `step`: share of
-    the range in a sample."""
+    """Loops in shares (0 .. 1) of a range: a full loop, shrinking loops, then pseudo-random ones; `step`: share of the
+    range per sample."""
     points = [0.5, 1.0, 0.0, *(0.5 + 0.5 * (-0.7) ** k for k in range(1, 8))]
     seed = 12345
     while sum(map(abs, np.diff(points))) < SAMPLES * step:
@@ -91,7 +91,7 @@ def _legs(step: float) -> Array:
 
 
 def _multisine(step: float) -> Array:
-    """Three sines in shares (0 .. 1) of a range that move by at most `step` of it in a sample."""
+    """Three sines in shares (0 .. 1) of a range, together moving by at most `step` of it per sample."""
     parts = ((1.0, 0.25), (math.sqrt(7.0), 0.15), (math.sqrt(31.0), 0.1))
     turn = step / sum(rate * size for rate, size in parts)
     angle = turn * np.arange(SAMPLES)

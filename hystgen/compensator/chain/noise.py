@@ -1,13 +1,13 @@
-"""The gain from the reference to the drive over all frequencies, and the averages that hold it below a limit.
+"""The gain from the reference to the drive over all frequencies, and the averages that keep it below a limit.
 
 A lead uses differences, whose gain grows with the frequency. A moving average over w samples lowers the largest gain of
 a difference to at most 2/w: `(1 - z)(1 + z + .. + z^(n-1) + e z^n) = 1 - (1 - e) z^n - e z^(n+1)` has no gain above 2,
 like `1 - z` itself. Averages are weights of the preview like all others: no state, no recursion, hence no limit cycles,
-and centred ones shift nothing in time. Poles in front of the lead that hold the same limit leave 5 to 50 times the
-error of smooth references with a preview, and 1.02 to 1.9 times without (benchmarks/chosen_numbers.py averages).
+and centred averages cause no delay. Low-pass poles in front of the lead that meet the same limit cause 5 to 50 times
+the error on smooth references with a preview, 1.02 to 1.9 times without (benchmarks/chosen_numbers.py averages).
 
-One average stands in front of all leads. Blocks in series are linear about an operating point, so only the product of
-their gains counts, and no rule has to divide the limit among them.
+The averages are placed in front of all leads. Blocks in series are linear about an operating point, so only the product
+of their gains matters, and the limit need not be divided among them.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ from hystgen.parameters.schema import MOST_REFERENCES
 Array = NDArray[np.float64]
 
 FREQUENCIES = np.append(np.geomspace(1e-10, 1e-3, 281)[:-1], np.linspace(1e-3, np.pi, 4096))
-"""[rad a sample] Frequencies at which a gain is evaluated first: 8 in each lobe of an average over 1000 samples, 40 in
-each decade below, where creep of up to 2^28 samples makes a step of the gain."""
+"""[rad per sample] Frequencies at which a gain is evaluated first: 8 per lobe of an average over 1000 samples, 40 per
+decade below, where creep with time constants of up to 2^28 samples causes a step in the gain."""
 
 PEAK = 0.9
-"""[largest value] Local maxima from here on are refined: between `FREQUENCIES` a lobe hides at most 8 %,
-`1 - cos(pi/8)`."""
+"""[share of the largest value] Local maxima above this are refined: between `FREQUENCIES` a lobe can rise unseen by at
+most 8 %, `1 - cos(pi/8)`."""
 
 HALVINGS = 60
-"""[steps] In a search for a frequency or a width: to the last bits of a double."""
+"""[steps] In the search for a frequency or a width, enough to reach the last bits of a double."""
 
 SAME = 1e-9
-"""[relative] Excess over a limit that counts as rounding: responses of a thousand weights have about 1e-13 of it."""
+"""[relative] Excess over a limit that counts as rounding: responses of a thousand weights are off by about 1e-13."""
 
 SERIES = 1.1
-"""[ratio] Of successive widths in a search: below 11 samples each adds less than one, while the gain falls and rises
-again over two."""
+"""[ratio] Of successive widths in a search: below 11 samples each step adds less than one sample, while the gain takes
+two samples to fall and rise again."""
 
 MOST_TIMES = 4
-"""[averages] Most in series. At half the gain one average loses least, at a twentieth two, and three where a lag and a
-mode are led together; a fifth is never best. Set by: benchmarks/chosen_numbers.py averages."""
+"""[averages] Maximum in series. To halve the gain, one average loses least; for a twentieth of it, two, and three if a
+lag and a mode are led together; five are never best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """The largest gain (N,) of a model's inverse at frequencies (N,) in rad a sample, over the gain at rest.
+    """The largest gain (N,) of a model's inverse at frequencies (N,) in rad per sample, relative to the gain at rest.
 
-    It holds for small changes of the reference, over any number of plays that follow: plays that relax, or whose
+    It applies to small changes of the reference, with any number of plays following: plays that relax, or whose
     thresholds grow with the rate, follow more slowly than in the static inverse. Blocks behind a lag remember the
-    signal that arrived, which is the wanted one less its second difference: with their response F, of which D comes at
-    once, and the lag's share L that arrives, the wanted input is `1/(D + (F - D) L)`. `taps`: of the preview.
+    signal that arrived, the one solved for minus its second difference: if F is their response, D the part of F without
+    delay, and L the share that arrives through the lag, the input solved for is `1/(D + (F - D) L)`. `taps`: preview.
     """
 
     static: StaticModel
@@ -80,7 +80,7 @@ class Gain:
 
     def drive(self, at: Array) -> Array:
         """The gain in drive units per unit of the reference, where plays and front are least steep; saturation, which
-        adds to it near its ends, is left out."""
+        increases it near the ends of its range, is left out."""
         led, _, answers = self._answers(at)
         least = self.static.front_slopes[0]
         if not self._moving_plays:
@@ -89,7 +89,7 @@ class Gain:
 
     def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
         """The lead (N,), the gain at rest behind the plays, and for each number of plays that follow, their slope at
-        rest and the response (N,) that divides the lead."""
+        rest and the response (N,) by which the lead is divided."""
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
         found = Responses(led, np.ones_like(z), np.ones_like(z), 1.0, 1.0)
@@ -102,7 +102,7 @@ class Gain:
         return found.led, found.rest, answers
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
-        """For each number of plays that follow: slope at rest, response, and the part of it that comes at once."""
+        """For each number of plays that follow: slope at rest, response, and the part of it without delay."""
         if not self._moving_plays:
             yield 1.0, np.ones_like(z), 1.0
         for mover in moving.movers(self.static, self.parts.plays, self._steepest):
@@ -127,13 +127,13 @@ class Gain:
 
     @cached_property
     def near(self) -> Array:
-        """Frequencies between which the gain cannot rise and fall unseen: a user's own blocks may ring."""
+        """Frequencies dense enough that no peak of the gain is missed, even if a user's own blocks ring."""
         return np.unique(np.concatenate([FREQUENCIES, *(one.ringing for one in self._blocks)]))
 
 
 def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:
     """The local maxima (M,) close to the largest one, and their frequencies; `near` is ascending, with at most one
-    maximum among three neighbours."""
+    maximum in any three adjacent frequencies."""
     found = gain(near)
     before, behind = (np.append(-np.inf, found[:-1]), np.append(found[1:], -np.inf))
     places = np.flatnonzero((found >= before) & (found >= behind) & (found >= PEAK * np.max(found)))
@@ -152,18 +152,18 @@ def largest(gain: Gain) -> float:
 
 
 def loudest(gain: Gain) -> tuple[float, float]:
-    """The largest `Gain.drive` over all frequencies, and its frequency in Hz."""
+    """The largest `Gain.drive` over all frequencies, and the frequency in Hz at which it occurs."""
     found, at = peaks(gain.drive, gain.near)
     k = int(np.argmax(found))
     return float(found[k]), float(at[k]) / (2.0 * np.pi * gain.seconds)
 
 
 def check(gain: float, limit: float) -> None:
-    """Raise UnsupportedEffectsError if the widest averages leave a noise gain above its limit, rounding aside."""
+    """Raise UnsupportedEffectsError if even the widest averages leave a noise gain above its limit, rounding aside."""
     if gain > limit * (1.0 + SAME):
         raise UnsupportedEffectsError(
             f"averages over {MOST_REFERENCES} samples of the reference, the most that the C keeps, leave a noise gain "
-            f"of {gain:.4g}, more than emit.compensation.noise_gain = {limit:g}; allow that much"
+            f"of {gain:.4g}, more than emit.compensation.noise_gain = {limit:g}; raise the limit"
         )
 
 
@@ -171,8 +171,8 @@ def check(gain: float, limit: float) -> None:
 class Smoothing:
     """`times` moving averages over `width` samples in series, `centred` or not, as in `preview.averages`.
 
-    `ahead`: samples by which the newest one of the last average is ahead of the motion. `without`: noise gain without
-    them.
+    `ahead`: samples by which the newest sample of the last average is ahead of the motion. `without`: noise gain
+    without the averages.
     """
 
     times: int
@@ -193,12 +193,12 @@ class Smoothing:
 
     @property
     def late(self) -> float:
-        """Samples by which they delay the motion."""
+        """Samples by which the averages delay the motion."""
         return self.age - self.ahead
 
     @property
     def variance(self) -> float:
-        """Variance of the samples' age: a slow sine loses `variance frequency^2/2`, with the frequency in rad."""
+        """Variance of the samples' age: a slow sine loses `variance frequency^2/2`, the frequency in rad per sample."""
         return float(self.row @ (np.arange(len(self.row))[::-1] - self.age) ** 2)
 
     def gain(self, at: Array) -> Array:
@@ -213,7 +213,7 @@ class Smoothing:
         return np.asarray((np.abs(one) / self.width) ** self.times)
 
     def loss(self, period: float) -> float:
-        """Share of its amplitude that a sine with a period given in samples loses."""
+        """Share of its amplitude lost by a sine whose period is given in samples."""
         return 1.0 - float(self.gain(np.array([2.0 * np.pi / period]))[0])
 
     def before(self, row: Taps) -> Taps:
@@ -222,11 +222,11 @@ class Smoothing:
 
 
 def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> Smoothing | None:
-    """The averages that hold a noise gain, or come closest, with at most `references` weights including the preview.
+    """The averages that meet a noise gain limit, or come closest, with at most `references` weights in the preview.
 
-    None if the gain is within the limit. They are centred if the reference may be read `asked` samples ahead (None: as
-    far as needed); else they look back, with the least delay. The number of averages is the one that loses least of a
-    slow reference.
+    None if the gain is already within the limit. The averages are centred if the reference may be read `asked` samples
+    ahead (None: as far as needed); else they look back, with the least delay. Their number is chosen to attenuate a
+    slow reference least.
     """
     without = largest(gain)
     if without <= limit * (1.0 + SAME):
@@ -242,8 +242,8 @@ def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> S
 
 
 def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
-    """The averages with the least variance that hold the limit with `room` further weights; if none do, those with the
-    least gain."""
+    """The averages with the least variance that meet the limit with `room` additional weights; if none do, those with
+    the least gain."""
     holding, failing = [], []
     for times in range(1, MOST_TIMES + 1):
         one, most = narrowest(gain, limit, times, max(room // times - 1.0, 1.0), centred)
@@ -255,7 +255,7 @@ def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
 
 
 def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool) -> tuple[Smoothing, float]:
-    """The least width at which `times` averages hold the limit, and their gain; the widest one if none does."""
+    """The least width at which `times` averages meet the limit, and their gain; `widest` if no width does."""
     near, sizes = gain.near, gain(gain.near)
 
     def holds(width: float) -> bool:
@@ -277,8 +277,8 @@ def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool
 
 
 def _bracket(holds: Callable[[float], bool], widest: float) -> tuple[float, float]:
-    """The last width of a series that does not hold a limit, and the next one, which does; the widest one twice if none
-    does. The gain does not always fall with the width: at first half the sample rate sets it, later the lobes do."""
+    """The last width in a series that misses the limit, and the next, which meets it; the widest twice if none does.
+    The gain does not always fall with the width: half the sample rate determines it first, later the lobes do."""
     low = high = 1.0
     while not holds(high):
         if high >= widest:

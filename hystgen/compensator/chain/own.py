@@ -1,9 +1,9 @@
-"""Blocks of a user's own effects: their numbers, and their gains for signals and errors.
+"""Blocks of a user's own effects: their parameters, and their gains for signals and errors.
 
 Such a block is linear, so calling its functions with unit states and inputs gives its matrices: forwards
-`s <- A s + B x`, `y = C s + D x` from absorb, and backwards from y to x from solve followed by absorb. Sums over all
+`s <- A s + B x`, `y = C s + D x` by absorb, and backwards from y to x by solve followed by absorb. Sums over all
 later samples are bounded mode by mode, `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A, or
-by sums of powers of A, whichever is smaller; if two modes coincide, only by powers.
+by sums of powers of A, whichever is smaller; only by powers if two modes coincide.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals, firsts
 
 Glue = tuple[Answer, Answer, Answer]
-"""The functions that an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
+"""The functions that connect an arithmetic to blocks: product, and conversions of a signal into a block and back."""
 
 SAME = 1e-9
-"""Relative difference up to which two answers of a block differ only by rounding, for time constants of up to a million
-samples, at which a difference of states loses that many digits."""
+"""Relative difference between two answers of a block up to which it counts as rounding, for time constants of up to a
+million samples, which cost a difference of states as many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks on one side of the plays. `number` (m,), in fixed point an `own_fixed.FixedNumber`: block j's begin at
-    `first[j]` (k + 1); its memory begins at `place[j]` (k + 1); `bits` (k,): bits of its signals below the chain's, in
-    fixed point."""
+    """Blocks on one side of the plays. `number` (m,): parameters, in fixed point an `own_fixed.FixedNumber`, those of
+    block j from `first[j]` (k + 1) on; `place` (k + 1): where the memory of each block begins; `bits` (k,): bits of a
+    block's signals below the chain's, in fixed point."""
 
     first: Counts
     number: Reals
@@ -53,9 +53,9 @@ class System:
     d: float
 
     def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None:
-        """The reciprocal loss of each mode per sample, the eigenvectors, and their inverse.
+        """The reciprocal of each mode's loss per sample, the eigenvectors, and their inverse.
 
-        None if two modes coincide, so that the eigenvectors do not span the states.
+        None if two modes coincide, since the eigenvectors then do not span the states.
         """
         values, vectors = np.linalg.eig(self.a)
         if np.linalg.matrix_rank(vectors) < len(values):
@@ -76,11 +76,11 @@ class System:
 
     @property
     def radius(self) -> float:
-        """Spectral radius: the share of a disturbance that each sample leaves in the long run."""
+        """Spectral radius: the share of a disturbance that remains from one sample to the next in the long run."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
 
     def states(self) -> Array:
-        """Largest states (n,) for inputs within 1."""
+        """Largest states (n,) for inputs of magnitude at most 1."""
         bound = self._sums() @ np.abs(self.b)
         if (modes := self._modes()) is not None:
             lost, vectors, back = modes
@@ -104,7 +104,7 @@ class System:
         return bound
 
     def before(self) -> float:
-        """Largest output from earlier inputs within 1."""
+        """Largest output caused by earlier inputs of magnitude at most 1."""
         bound = float(self.after() @ np.abs(self.b))
         if (modes := self._modes()) is not None:
             lost, vectors, back = modes
@@ -113,7 +113,7 @@ class System:
 
     @property
     def largest(self) -> float:
-        """Largest output for inputs within 1."""
+        """Largest output for inputs of magnitude at most 1."""
         return abs(self.d) + self.before()
 
     def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -124,7 +124,7 @@ class System:
 
 @dataclass(frozen=True)
 class Linear(One):
-    """A block at one step length: forwards and backwards, its gain at rest, and its states (n,) at rest at input 1."""
+    """A block at one step length: forwards and backwards, its gain at rest, and its states (n,) resting at input 1."""
 
     effect: Effect
     numbers: Array
@@ -135,7 +135,7 @@ class Linear(One):
 
     @property
     def exact(self) -> bool:
-        """Whether solve gives the input for which absorb returns the output asked for."""
+        """Whether solve returns the input for which absorb returns the requested output."""
         f, b = self.forward, self.backward
         return abs(b.d * f.d - 1.0) <= SAME and bool(np.all(np.abs(b.c + b.d * f.c) <= SAME * (1.0 + np.abs(f.c))))
 
@@ -146,7 +146,7 @@ class Linear(One):
 
     @property
     def growth(self) -> float:
-        """Largest output for inputs within 1."""
+        """Largest output for inputs of magnitude at most 1."""
         return self.forward.largest
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:  # noqa: ARG002  as in every block
@@ -158,7 +158,7 @@ class Linear(One):
         return self.solved(error, drive, u, same)
 
     def seen(self) -> float:
-        """Factor by which states that see the block's input multiply an error of that input."""
+        """Factor by which states that see the block's input amplify an error of that input."""
         return self.passed(0.0, 1.0)
 
     @property
@@ -168,11 +168,11 @@ class Linear(One):
 
     @property
     def ringing(self) -> Array:
-        """Frequencies (k,) in rad a sample at which its inverse may ring."""
+        """Frequencies (k,) in rad per sample at which its inverse may ring."""
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
-        """Responses with this block added behind other blocks."""
+        """Responses with this block added behind the others."""
         found = found._replace(rest=found.rest * self.rest)
         if not self.exact:
             return found._replace(led=found.led * self.backward.response(z))
@@ -180,7 +180,7 @@ class Linear(One):
 
     @property
     def fineness(self) -> float:
-        """Bits that its lead costs a signal in front of the plays."""
+        """Bits of accuracy that its lead costs a signal in front of the plays."""
         return math.log2(2.0 * self.backward.largest)
 
     def at_rest(self, x: float) -> float:
@@ -188,20 +188,20 @@ class Linear(One):
         return x * self.rest
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size * self.forward.largest * margin.slack + 1.0
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input from solve or resting for an output within a size, after inputs within `given`."""
+        """Largest input from solve or resting for outputs of magnitude up to `asked`, after inputs up to `given`."""
         now, before = abs(self.forward.d), self.forward.before()
         return max((asked + before * given) / now, asked / self.rest) * margin.slack + 1.0
 
     def sizes(self) -> Array:
-        """Largest states (n,) for inputs within 1, starting from rest at such an input."""
+        """Largest states (n,) for inputs of magnitude at most 1, starting from rest at such an input."""
         return self.forward.states() + np.abs(self.settled)
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the inverse's input for an exact output."""
+        """Roundings of the output for inputs up to `size`, and of the inverse's answer for an exact output."""
         shares = self._shares(u)
         sizes = [Rounded(each, 0.0, u) for each in (size * self.sizes()).tolist()]
         state = np.array(sizes, dtype=object)
@@ -218,10 +218,10 @@ class Linear(One):
     def passed(self, error: float, own: float = 0.0) -> float:
         """Error of the input for an error of the output, and for roundings `own` of solve.
 
-        A limit may pass an input error on in part or not at all. A single state then lies between its values for the
-        two cases. If earlier inputs count less in an output than the present one, input errors contract. If solve gives
-        the input for which absorb returns the output, an input error acts like an error of the output asked for, scaled
-        by the weight of the present input.
+        A limit may pass an input error on in part or not at all. A single state then lies between its values for these
+        two cases. If earlier inputs count less in an output than the present one, input errors contract. If solve
+        returns the input for which absorb returns the output, an input error acts like an error of the requested
+        output, scaled by the weight of the present input.
         """
         forward, back = self.forward, self.backward
         before, now = forward.before(), abs(forward.d)
@@ -237,7 +237,7 @@ class Linear(One):
 
 @dataclass(frozen=True)
 class Rounded:
-    """A number within `size`, no farther than `error` from the exact one; each operation rounds by `u`."""
+    """A number of magnitude up to `size`, within `error` of its exact value; each operation rounds by `u`."""
 
     size: float
     error: float
@@ -290,7 +290,7 @@ def linear(effect: Effect, seconds: float) -> Linear:
 
 
 def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
-    """Reasons why the C cannot include an effect's block, in fixed point or in floating point."""
+    """Reasons why the C cannot include an effect's block, in fixed or floating point."""
     assert effect.block is not None
     one = linear(effect, seconds)
     if not _adds_up(one, seconds):
@@ -304,28 +304,28 @@ def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
     stays = abs(instance.absorb(2.0) - settled) <= SAME * max(abs(settled), 1.0)
     if not stays or np.max(np.abs(instance.state - before)) > SAME * max(1.0, float(np.max(np.abs(before)))):
         yield (
-            "its block does not stay where rest leaves it: absorb of the same input has to give the same output, "
+            "its block does not stay at rest: after rest, absorb of the same input must return the same output, "
             "at steps of any length"
         )
     elif abs(instance.resting(settled) - 2.0) > SAME:
-        yield f"resting({settled:g}) is {instance.resting(settled):g}, and rest(2) is {settled:g}; one undoes the other"
+        yield f"resting({settled:g}) is {instance.resting(settled):g}, but rest(2) is {settled:g}; they must be inverse"
     elif one.rest <= 0.0:
-        yield f"its output at rest is {one.rest:g} times its input; the inverse needs it to rise"
+        yield f"its output at rest is {one.rest:g} times its input; the inverse needs a positive factor"
     elif max(one.forward.radius, one.backward.radius) >= 1.0:
         where, radius = max(("its block", one.forward.radius), ("its inverse", one.backward.radius), key=lambda e: e[1])
-        yield f"{where} keeps {radius:.6g} of a disturbance from sample to sample, and has to lose it"
+        yield f"{where} keeps {radius:.6g} of a disturbance from sample to sample, but it has to decay"
     elif effect.place is Place.DRIVE and (abs(one.rest - 1.0) > SAME or one.forward.largest > 1.0 + SAME):
         yield (
-            f"in front of the plays a drive at rest has to pass as it is, and none may overshoot; it passes "
+            f"in front of the plays a block must pass a drive at rest unchanged and not overshoot; this one passes "
             f"{one.rest:g} of it at rest and up to {one.forward.largest:g} on the way"
         )
     elif fixed and not one.exact:
         yield (
-            "its solve does not give the input for which absorb returns the output asked for, and fixed point bounds "
-            "its numbers by that; use float32"
+            "its solve does not return the input for which absorb returns the requested output, which the formats of "
+            "fixed point rely on; use float32"
         )
     elif fixed and not _stays_for_solve(effect, seconds):
-        yield "its solve changes the memory, which fixed point bounds by what absorb and rest do; leave that to absorb"
+        yield "its solve changes the memory, but fixed point bounds only what absorb and rest do; leave that to absorb"
 
 
 def _stays_for_solve(effect: Effect, seconds: float) -> bool:
@@ -339,7 +339,7 @@ def _stays_for_solve(effect: Effect, seconds: float) -> bool:
 
 
 def _adds_up(one: Linear, seconds: float) -> bool:
-    """Whether a block is linear: it answers random states and inputs like the system built from its unit answers."""
+    """Whether a block is linear: it answers random states and inputs like the system made of its unit responses."""
     rng = np.random.default_rng(0)
     instance = own.Instance(one.effect)
     instance.advance(seconds)
@@ -358,17 +358,17 @@ def _adds_up(one: Linear, seconds: float) -> bool:
 
 
 def build(every: Sequence[Linear], reals: Callable[[ArrayLike, str], Reals]) -> OwnTables:
-    """The numbers of the blocks on one side of the plays."""
+    """The tables of the blocks on one side of the plays."""
     return OwnTables(
         firsts(len(each.numbers) for each in every),
-        reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
+        reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "parameters of your own effects"),
         firsts(len(each.settled) for each in every),
         np.zeros(len(every), dtype=np.int64),
     )
 
 
 def constants(t: OwnTables, kinds: Sequence[type[Effect]], products: int = 1) -> list[Constants]:
-    """The numbers of each of these effects' blocks; `products`: multiplications in one of theirs."""
+    """The parameters of the blocks of each of these effects; `products`: multiplications per product of a block."""
     found = []
     for j, effect in enumerate(kinds):
         assert effect.block is not None
@@ -389,7 +389,7 @@ def product(number: Scalar, x: Scalar) -> Scalar:
 
 @jit(inline=True)
 def passed(t: OwnTables, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
-    """A signal of the chain as one of block j, and the reverse: the number is the same."""
+    """A signal of the chain as one of block j, or the reverse: the value is the same."""
     return x
 
 
@@ -405,8 +405,8 @@ def arithmetic(
     blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, products: int,
     tables: Callable[..., object], formats: Callable[..., object] = lambda one, *_: one,
 ) -> Realized:
-    """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications in one of
-    theirs; `tables`, `formats`: as in `Realized`."""
+    """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications per product of
+    a block; `tables`, `formats`: as in `Realized`."""
 
     def through(verb: str) -> Answer:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
@@ -429,7 +429,7 @@ def _both(first: Answer, behind: Answer) -> Answer:
 
 
 def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Answer:
-    """A verb of block j, bound to its numbers and memory."""
+    """A verb of block j, bound to its parameters and memory."""
     product, entered, left = made
     function = block.compiled(verb, product)
     if verb == "resting":

@@ -1,8 +1,8 @@
 """Blocks of a user's own effects in fixed point: formats derived from their functions, and roundings.
 
 The functions are the same as in floating point. Signals in a block have enough bits below the chain's to keep the
-accumulated roundings of its states below a fraction of the chain's last bit. A number of its table is a factor; if an
-argument has more bits than a product takes, the product leaves out its last bits.
+accumulated roundings of its states below a fraction of the chain's last bit. Table entries are factors; if an argument
+has more bits than a product can take, the product drops its last bits.
 """
 
 from __future__ import annotations
@@ -32,8 +32,7 @@ Row = tuple[tuple[int, int], int, int]
 
 
 class FixedNumber(Struct):
-    """A factor of a block of the user's own, and the bits that a product leaves out of its argument and of its
-    result."""
+    """A factor of a user's own block, and the number of bits that a product drops from its argument and its result."""
 
     factor: Factor
     drop: UInt8
@@ -42,8 +41,8 @@ class FixedNumber(Struct):
 
 @dataclass(frozen=True)
 class Formats(Coded):
-    """A block in fixed point: `table` of its numbers; `bits` of its signals below the chain's; `output` and `answer`:
-    roundings of the results of absorb and solve, in units of the chain's signals."""
+    """A block in fixed point: `table` of its parameters; `bits` of its signals below the chain's; `output` and
+    `answer`: roundings of the results of absorb and solve, in units of the chain's signals."""
 
     linear: Linear
     table: list[Row]
@@ -62,7 +61,7 @@ class Formats(Coded):
         return self.output
 
     def led(self, error: float, code: float, same: bool, turning: bool) -> float:  # noqa: ARG002  as in every block
-        """Error of the input for an error of the output asked for; `code`: rounding of the input."""
+        """Error of the input for an error of the requested output; `code`: rounding of the input."""
         return self._passed(error + self.output, self.answer + code, same)
 
     def there(self, size: float, signal: float) -> float:  # noqa: ARG002  as in every block
@@ -75,7 +74,7 @@ class Formats(Coded):
         return self._passed(error + states, self.answer * at.signal, at.same)
 
     def residual(self, missed: float, same: bool) -> float:
-        """The error of an output for an error of the sum of the plays that the inverse leaves."""
+        """The output error that results from an error of the sum of the plays left by the inverse."""
         return self._passed(0.0, missed, same)
 
     def _passed(self, error: float, own: float, same: bool) -> float:
@@ -85,7 +84,7 @@ class Formats(Coded):
 
 @dataclass
 class _Number:
-    """A number of a table, and the largest size of its arguments; `exact`: whether its factor counts as exact."""
+    """A table entry, and the largest magnitude of its arguments; `exact`: whether its factor counts as exact."""
 
     value: float
     row: Row
@@ -103,7 +102,7 @@ class _Number:
 
 @dataclass(frozen=True)
 class _Traced:
-    """A whole number within `size`, at most `error` from the exact one; `most`: the largest of all sizes."""
+    """An integer of magnitude up to `size`, within `error` of its exact value; `most`: the largest of all sizes."""
 
     size: float
     error: float
@@ -123,7 +122,7 @@ class _Traced:
 
 
 def _row(value: float, seen: float) -> Row:
-    """A number of the table for arguments up to `seen`."""
+    """A table entry for arguments up to `seen`."""
     drop = max(0, math.ceil(math.log2(max(seen, 1.0))) + 1 - (LARGEST.bit_length() - 1))
     lift = lifted(value * 2.0**drop, 0)
     return factor(value * 2.0 ** (drop - lift)), drop, lift
@@ -140,9 +139,9 @@ class _Trace:
     def run(
         self, rows: Sequence[Row], bits: int, exact: bool
     ) -> tuple[list[float], float, float, float]:
-        """The largest argument of each number, the largest size, and the roundings of absorb and of solve, with `bits`
-        more bits for signals; `exact`: without the errors of factors, which are proportional to the signals and which
-        more bits do not reduce."""
+        """The largest argument of each table entry, the largest magnitude of all, and the roundings of absorb and of
+        solve, with `bits` more bits for signals; `exact`: without the errors of factors, which are proportional to the
+        signals and which more bits do not reduce."""
         most = [0.0]
         pairs = zip(self.linear.numbers.tolist(), rows, strict=True)
         numbers = [_Number(value, row, exact) for value, row in pairs]
@@ -169,7 +168,7 @@ class _Trace:
 def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     """A block for inputs up to `given` and outputs up to `asked`, in signals of the chain.
 
-    These have `code` bits below a code. Raises OverflowError if its numbers do not fit or its states would stall.
+    The chain's signals have `code` bits below a code. Raises OverflowError if numbers do not fit or states would stall.
     """
     trace = _Trace(linear, given, asked)
     values = linear.numbers.tolist()
@@ -184,7 +183,7 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
 
 
 def build(rows: Sequence[Formats]) -> OwnTables:
-    """The numbers of the blocks on one side of the plays."""
+    """The tables of the blocks on one side of the plays."""
     return OwnTables(
         firsts(len(each.table) for each in rows),
         FixedNumber.of([number for each in rows for number in each.table]),
@@ -198,7 +197,7 @@ def build(rows: Sequence[Formats]) -> OwnTables:
 
 @jit
 def product(number: Any, x: int) -> int:
-    """A number of the table times x, rounded to the nearest whole number."""
+    """A table entry times x, rounded to the nearest integer."""
     found: int = times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
     return found
 
@@ -220,7 +219,7 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
     ahead = place is Place.DRIVE
 
     def format_of(one: Linear, about: FixedSurroundings, size: float, asked: float) -> Formats:
-        bits = 0 if ahead else about.bits  # of the sizes in front of the plays below the given ones
+        bits = 0 if ahead else about.bits  # of signals in front of the plays, below the given sizes
         return formats(one, size * 2.0**bits, asked * 2.0**bits, bits)
 
     def problems(effect: Effect, at: Setting) -> Iterator[str]:

@@ -52,17 +52,17 @@ def _at(*places: Place, forward: bool = False) -> list[ChainPart]:
 
 
 SENT = tuple(part for part in _CATALOGUE if part.place is Place.DRIVE and part.forward)
-"""Between the drive and the amplifier."""
+"""Parts between the drive and the amplifier."""
 
 AHEAD = (*_at(Place.DRIVE), OWN_AHEAD)
-"""In front of the plays, from the amplifier on. In front of two branches only the first is led."""
+"""Parts in front of the plays, from the amplifier on. In front of two branches only the first is led."""
 
 _first, *_others = _at(Place.LINEAR, Place.GAIN, forward=True)
 BEHIND = (_first, OWN_BEHIND, *_others)
-"""Behind the plays, from their sum on."""
+"""Parts behind the plays, from their sum on."""
 
 BESIDE = tuple(_at(Place.ADDED))
-"""Added to the displacement."""
+"""Parts added to the displacement."""
 
 PARTS = (*SENT, *AHEAD, *BEHIND, *BESIDE)
 """All parts, in the order of `ChainTables.blocks`."""
@@ -74,7 +74,7 @@ LED = PARTS.index(AHEAD[0])
 def parts_with(
     ahead: Sequence[OwnBlock], behind: Sequence[OwnBlock], effects: Sequence[type[Effect]] = ()
 ) -> list[ChainPart]:
-    """The parts of a model with a user's own blocks; `effects`: the classes of these blocks, those `ahead` first."""
+    """The parts of a model with a user's own blocks; `effects`: the classes of these blocks, starting with `ahead`."""
     given = {
         OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, Place.DRIVE, ahead, effects[: len(ahead)]),
         OWN_BEHIND.name: own_fixed.part(OWN_BEHIND.name, Place.LINEAR, behind, effects[len(ahead) :]),
@@ -84,7 +84,7 @@ def parts_with(
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by their part in the chain, each list in the order of the chain; `blocks`: by part
+    """The effects of a model by part of the chain, each list in the order of the chain; `blocks`: by the part's
     name."""
 
     blocks: dict[str, list[Any]]
@@ -129,14 +129,14 @@ class Parts:
         return np.minimum(np.array(found, dtype=np.int64), most)
 
     def ones(self, seconds: float, turning: bool = False, parts: Sequence[ChainPart] = PARTS) -> dict[str, list[Any]]:
-        """The blocks of some parts at steps of `seconds`."""
+        """The blocks of the given parts at steps of `seconds`."""
         return {
             part.name: [part.one(effect, seconds, turning) for effect in self.blocks[part.name]] for part in parts
         }
 
     @property
     def leading(self) -> list[Any]:
-        """Effects in front of the plays: their inverse leads."""
+        """Effects in front of the plays, whose inverse leads."""
         return [effect for part in AHEAD for effect in self.blocks[part.name]]
 
     def behind(self, seconds: float) -> list[Any]:
@@ -145,5 +145,5 @@ class Parts:
         return [one for each in ones.values() for one in each]
 
     def turning(self, branches: bool) -> bool:
-        """Whether exactly one block is led, and in front of a memoryless part that has two `branches`."""
+        """Whether exactly one block is led, in front of a memoryless part with two `branches`."""
         return branches and len(self.blocks[AHEAD[0].name]) == 1 == len(self.leading)

@@ -1,8 +1,8 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
-A delay takes linear interpolation between two samples; a mode takes three samples, or a shaper or a notch for steps
-from point to point. In series they are one row of weights, which sum to 1: without recursion they are stable for any
-numbers.
+A delay is compensated by linear interpolation between two samples; a mode by three samples, or by a shaper or a notch
+for steps from point to point. In series they are one row of weights, which sum to 1; without recursion they are stable
+for any parameters.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hystgen.plays.slots import Counts, Reals
 
 
 class Mode(Protocol):
-    """An effect with a pair of poles; a setting of `emit.compensation` under its name tells how it is compensated."""
+    """An effect with a pair of poles; the `emit.compensation` key of its name sets how it is compensated."""
 
     @property
     def name(self) -> str: ...
@@ -31,7 +31,7 @@ class Mode(Protocol):
     def damping(self) -> float: ...
     def rings(self, by: By, /) -> bool: ...
     def denominator(self, step: float, /) -> tuple[float, float]:
-        """`a1`, `a2` of its poles over a step, `z^2 + a1 z + a2`."""
+        """`a1`, `a2` of its poles at steps of this length, `z^2 + a1 z + a2`."""
 
 
 class Taps(NamedTuple):
@@ -42,7 +42,7 @@ class Taps(NamedTuple):
 
     @property
     def ahead(self) -> int:
-        """Samples by which the last weight looks ahead."""
+        """Samples by which the last weight is ahead."""
         return self.first + len(self.weights) - 1
 
 
@@ -51,19 +51,19 @@ PLAIN = Taps(0, np.ones(1))
 
 
 By = Literal["inverse", "shaper", "notch"]
-"""How modes are compensated."""
+"""How a mode is compensated."""
 
 
 def taps(
     delay: float, modes: Sequence[Mode], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
-    """The weights for a delay in s and modes in series at samples `seconds` apart; else the reference itself.
+    """The weights for a delay in s and modes in series at samples `seconds` apart; without either, the plain reference.
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 references cancel that
-    smoothing up to a fourth difference. `corner`: three centred moving averages over this number of samples smooth the
+    smoothing up to a fourth difference. `corner`: three centred moving averages over this many samples smooth the
     reference. `by`: how a mode that would ring after a step is kept from ringing.
 
-    Raises FormatError if modes that are kept from ringing take more references than the C keeps.
+    Raises FormatError if keeping modes from ringing takes more references than the C keeps.
     """
     samples = delay / seconds
     whole = math.floor(samples)
@@ -76,7 +76,7 @@ def taps(
             weights = np.convolve(weights, row)
             first -= len(row) - 1
             if len(weights) > MOST_REFERENCES:
-                raise _too_long(mode, f"the modes take {len(weights)} samples one behind the other")
+                raise _too_long(mode, f"the modes take {len(weights)} samples in series")
             continue
         a1, a2 = mode.denominator(seconds)
         weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
@@ -97,9 +97,9 @@ def taps(
 def shaper(mode: Mode, seconds: float) -> NDArray[np.float64]:
     """The weights (n + 2,) of the reference now and about half a period ago, after which a mode does not ring.
 
-    They apply to the samples now and n and n + 1 samples ago, between which half a period lies. They sum to 1 and
-    vanish at the mode's poles p, so that nothing of the mode remains after a step: `sum w_k p^-k = 0`, zero vibration
-    in samples.
+    They apply to the present sample and those n and n + 1 samples ago, between which half a period lies. They sum to 1
+    and vanish at the mode's poles p, so that no vibration remains after a step: `sum w_k p^-k = 0`, the sampled form of
+    a zero-vibration shaper.
     """
     a1, a2 = mode.denominator(seconds)
     pole = complex(-0.5 * a1, math.sqrt(a2 - 0.25 * a1 * a1))
@@ -116,12 +116,12 @@ def shaper(mode: Mode, seconds: float) -> NDArray[np.float64]:
 
 
 def notch(mode: Mode, seconds: float) -> NDArray[np.float64]:
-    """The weights of the reference now and before, after which a mode does not ring: its poles as zeros, `A(z)/A(1)`,
-    behind two averages over `coth(w0 T/2)` samples.
+    """The weights of the present and earlier references with which a mode does not ring: its poles as zeros,
+    `A(z)/A(1)`, behind two averages over `coth(w0 T/2)` samples.
 
-    Two poles at `p = exp(-w0 T)` in place of the averages would have the same mean delay, `2 p/(1 - p)`, up to part of
-    a sample, and the same bound on the gain of two differences, `((1 - p)/(1 + p))^2`; but they approach a step slowly,
-    within 0.1 % after 9.2 times `1/w0`, where the averages end after 4, and they keep a state that rounding may stall.
+    Two poles at `p = exp(-w0 T)` instead of the averages would have the same mean delay, `2 p/(1 - p)`, to within a
+    sample, and the same bound on the gain of two differences, `((1 - p)/(1 + p))^2`; but they settle slowly, to 0.1 %
+    of a step in 9.2 times `1/w0`, while the averages end after 4, and they keep a state that rounding may stall.
     """
     a1, a2 = mode.denominator(seconds)
     width = 1.0 / math.tanh(math.pi * mode.frequency * seconds)
@@ -138,7 +138,7 @@ def _too_long(mode: Mode, what: str) -> FormatError:
 def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
     """The weights of `times` moving averages over `width` samples in series, from the oldest sample to the newest.
 
-    `centred`: symmetric about a sample; else the newest samples count in full.
+    `centred`: symmetric about a sample; else the newest samples have full weight.
     """
     n = whole(width, centred)
     rest = width - n
@@ -151,7 +151,7 @@ def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
 
 
 def whole(width: float, centred: bool) -> int:
-    """Samples of an average that count in full."""
+    """Number of samples of an average that have full weight."""
     return 2 * int((width - 1.0) // 2.0) + 1 if centred else int(width)
 
 
@@ -171,7 +171,7 @@ class Shaped(NamedTuple):
         return float(ages @ self.taps.weights) + own / self.seconds
 
     def missed(self, period: float) -> float:
-        """Tracking error for a sine with a period given in samples, as a share of its amplitude."""
+        """Tracking error for a sine whose period is given in samples, as a share of its amplitude."""
         turn = 2j * math.pi / period
         ages = -(self.taps.first + np.arange(len(self.taps.weights)))
         found = complex(np.exp(-turn * ages) @ self.taps.weights)
@@ -197,7 +197,7 @@ def led(needed: Taps, samples: int | None) -> Taps:
 
 
 class PreviewLine(NamedTuple):
-    """The last samples of the reference (L,), the newest one last, and whether there are any yet (1,)."""
+    """The last samples of the reference (L,), newest last, and whether there are any yet (1,)."""
 
     sample: Reals
     filled: Counts

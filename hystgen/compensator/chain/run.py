@@ -22,7 +22,7 @@ def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
 
 def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """Answers (N,) for the drives or references in `record.v`, and their status bits; for a preview the last sample
-    repeats.
+    is repeated.
 
     Bits about a sample itself (limited, held) come with the sample, bits about a drive with the drive. Fixed point
     takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.

@@ -1,7 +1,7 @@
-"""The two sides of the plays, in front of them and behind: the blocks of each part of the chain, part by part.
+"""The two sides of the plays, in front of them and behind: the blocks of the chain, part by part.
 
 A user's own blocks come after the lag in front of the plays, and after creep behind them. All of these are linear and
-time-invariant, so their order makes no difference.
+time-invariant, so their order does not matter.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Blocks(NamedTuple):
     front: tuple[Answer, LimitedAnswer]  # forward, inverse
     plays: tuple[Action, Answer, Answer, Answer]  # start, follow, started, inverse input
     finer: Answer  # the signal in front of the plays, with bits below their input
-    braked: Answer  # the drive in reach that keeps a lag from overshooting
+    braked: Answer  # the reachable drive that keeps a lag from overshooting
     ramp: Callable[..., tuple[Scalar, Scalar]]  # a slew-limited drive one step later, and its rounding remainder
 
 
 class BlockMemory(Protocol):
-    """The memory of a chain's blocks, part by part, and their numbers in this operator."""
+    """The memory of a chain's blocks, part by part, and how many of them this operator has."""
 
     @property
     def blocks(self) -> tuple[object, ...]: ...
@@ -41,7 +41,7 @@ class BlockMemory(Protocol):
 
 
 def _then(first: Answer, k: int, verb: Answer) -> Answer:
-    """Apply `first`, then a verb of all blocks of part k in series."""
+    """A function that applies `first`, then a verb of all blocks of part k in series."""
 
     @jit
     def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
@@ -57,7 +57,7 @@ def _then(first: Answer, k: int, verb: Answer) -> Answer:
 
 
 def _back(first: Answer, k: int, verb: Answer) -> Answer:
-    """As `_then`, from the last block to the first."""
+    """As `_then`, but from the last block to the first."""
 
     @jit
     def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
@@ -79,7 +79,7 @@ def _nothing(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:  # noqa: ARG0
 
 
 def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> Iterator[Answer]:
-    """Verbs of all blocks on one side, as functions of tables, state and a number, from the verbs of all parts."""
+    """The given verbs for all blocks on one side, as functions of tables, state and a number."""
 
     def through(verb: str) -> Answer:
         back = verb in ("resting", "solve")
@@ -99,7 +99,7 @@ def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> I
 
 
 def _all(every: Sequence[Verbs], verb: str, and_then: Callable[[F, int, F], F], nothing: F) -> F:
-    """A verb of all blocks that have it, part by part, after `nothing`."""
+    """A verb of all blocks that have it, part by part, starting with `nothing`."""
     for k, verbs in enumerate(every):
         if function := getattr(verbs, verb):
             nothing = and_then(nothing, k, function)
@@ -107,7 +107,7 @@ def _all(every: Sequence[Verbs], verb: str, and_then: Callable[[F, int, F], F], 
 
 
 def told(every: Sequence[Verbs], verb: str) -> Check:
-    """A verb that takes a number from the caller; it returns whether any block had to limit that number."""
+    """A verb that passes a number from the caller to all blocks, and returns whether any of them had to limit it."""
 
     def and_then(first: Check, k: int, function: Check) -> Check:
         @jit

@@ -49,7 +49,7 @@ AGED = next(k for k, part in enumerate(PARTS) if "travel" in part.calls)
 
 
 class RampState(Struct):
-    """A drive on its way at a limited rate: as it is sent, and its rounding remainder."""
+    """A drive in motion at a limited rate: as sent, and its rounding remainder."""
 
     drive: Real
     rest: Real
@@ -60,29 +60,29 @@ class QuietState(Struct):
 
     arrived: Signal  # in front of the plays
     reference: Signal
-    equal: UInt32  # references in a row, up to one more than a drive waits for to stand still
+    equal: UInt32  # references in a row, counted up to one more than are needed for the drive to stand still
 
 
 class SteadyState(Struct):
     """A lag in front of two branches."""
 
-    way: Signal  # of what the lag is led to, in this sample,
-    moved: Signal  # and in the one before
-    rises: Flag  # it arrives from below
+    way: Signal  # move of the signal to which the lag is led, in this sample,
+    moved: Signal  # and in the previous one
+    rises: Flag  # the lag arrives from below
 
 
 class OwnState(Struct):
-    """What every model with effects keeps besides `StepState`."""
+    """The memory of every model with effects in addition to `StepState`."""
 
     applied: Real  # drive seen last
-    output: Signal  # what the output side made of the sum of the plays
-    offset: Signal  # set beside that of the model
-    moving: Flag  # a drive was applied
+    output: Signal  # result of the output side for the sum of the plays
+    offset: Signal  # set in addition to that of the model
+    moving: Flag  # a drive has been applied
     inverse: Flag  # whether it is the inverse operator
 
 
 class ChainState(NamedTuple):
-    """One instance. `corners`: the plays of engine corners, or `()` in engine loop, which has them in `plays`."""
+    """One instance. `corners`: the plays in engine corners, `()` in engine loop, which keeps its plays in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), rounding remainder of each play that a nonlinear dashpot moves
@@ -130,7 +130,7 @@ class Conversions(NamedTuple):
     level_signal: Answer
     drive_code: Answer
     output_code: LimitedAnswer  # with status bits
-    entered_travel: Answer  # as verification sets it
+    entered_travel: Answer  # a travel as verification sets it
     shared: Answer  # a share of a signal
 
 
@@ -141,7 +141,7 @@ def made_of(
     own blocks in front of the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
-    clock: Any = every[CLOCK]  # which has all of these
+    clock: Any = every[CLOCK]  # which has all of the following
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
     travelled_by = every[AGED].travelled
     assert travelled_by
@@ -171,7 +171,7 @@ def made_of(
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Scalar) -> tuple[Scalar, int]:
-        """The result that the output side has to give for the displacement u, and whether there is none."""
+        """The result that the output side has to give for displacement u, and whether no such result exists."""
         offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
             filled, moving = s.line.filled[0], s.own.moving[0]
@@ -189,15 +189,15 @@ def made_of(
 
     @jit
     def travelled(t: ChainTables, s: ChainState, v: Scalar) -> None:
-        """Move the drive from where it was to v, in one sample."""
+        """Move the drive from its last value to v, in one sample."""
         blocks_move(t, s, s.own.applied[0], v)
 
     # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
 
     @jit(inline=True)
     def turns(t: ChainTables, back: Scalar, way: Scalar) -> bool:
-        """Whether a drive that should go back by `back` turns to the other branch, `way` from there. Behind a lag it
-        turns only if holding misses more than the lag misses of that way in the first sample of a turn."""
+        """Whether a drive that should go back by `back` turns to the other branch, `way` from there. If it leads a lag,
+        it turns only if holding misses by more than the lag would in the first sample of a turn over `way`."""
         missed = back - t.plays.limits[HOLD]
         if not t.turning:
             return bool(missed > 0)
@@ -208,7 +208,7 @@ def made_of(
     @jit
     def branch_drive(t: ChainTables, s: ChainState, h: Scalar, w: Scalar) -> Scalar:
         """The drive that gives w on the branch of its own move: it stays on its branch while it moves on or holds, and
-        turns only for more than rounding."""
+        turns only to go back by more than rounding."""
         if not t.plays.branches:
             return inverse_drive(t.plays, s.plays, h, w)
         up, drive = s.plays.step.ascending[0], s.plays.step.drive[0]
@@ -236,7 +236,7 @@ def made_of(
 
     @jit
     def steady_drive(t: ChainTables, s: ChainState, a: Scalar) -> Scalar:
-        """The drive that leads to a in front of two branches, through a lag arriving from the side of its branch."""
+        """The drive that leads to a in front of two branches, with the lag arriving from the side of its branch."""
         s.steady.rises[0] = s.plays.step.ascending[0]
         if a > s.plays.step.drive[0]:
             s.steady.rises[0] = 1
@@ -249,7 +249,7 @@ def made_of(
 
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
-        """The drive v, or one that keeps the lag on its branch."""
+        """The drive v, or a drive that keeps the lag on its branch."""
         last = drive_signal(t, s.own.applied[0])
         return led_kept(t.blocks[LED], s.blocks[LED], v, s.steady.rises[0], last, t.number.dither[0])
 
@@ -257,14 +257,14 @@ def made_of(
 
     @jit
     def quiet_rest(t: ChainTables, s: ChainState, a: Scalar) -> None:
-        """Settle everything with a in front of the plays."""
+        """Record that everything is at rest with a in front of the plays."""
         s.quiet.arrived[0] = a
         s.quiet.reference[0] = t.limits[ZERO]
         s.quiet.equal[0] = 0
 
     @jit
     def quiet_count(t: ChainTables, s: ChainState, u: Scalar) -> None:
-        """Count references equal to the next one, u."""
+        """Count how many references in a row are equal, the next one being u."""
         if u != s.quiet.reference[0]:
             s.quiet.reference[0] = u
             s.quiet.equal[0] = 0
@@ -273,7 +273,7 @@ def made_of(
 
     @jit
     def quiet_drive(t: ChainTables, s: ChainState, a: Scalar, v: Scalar) -> Scalar:
-        """The drive for a in front of the plays: v, which leads there, or one that stands still."""
+        """The drive for a in front of the plays: v, which leads to a, or a drive that stands still."""
         most = t.number.dither[0]
         away = v - a
         if s.quiet.equal[0] > t.quiet:
@@ -294,7 +294,7 @@ def made_of(
 
     @jit
     def expected(t: ChainTables, s: ChainState) -> Scalar:
-        """The displacement that the model expects from the last absorbed drive."""
+        """The displacement that the model expects after the last absorbed drive."""
         code, _ = output_code(t, displacement(t, s, s.own.output[0]))
         return code
 
@@ -316,7 +316,7 @@ def made_of(
 
     @jit
     def absorb(t: ChainTables, s: ChainState, v: Scalar, reached: Scalar) -> None:
-        """Absorb drive v, which is `reached` behind its delay and slew limit; the first drive finds everything at
+        """Absorb drive v, which has become `reached` behind delay and slew limit; the first drive finds everything at
         rest."""
         moving = s.own.moving[0] != 0
         if moving:
@@ -346,7 +346,7 @@ def made_of(
     @jit
     def nearest_ramp(t: ChainTables, before: Scalar, rest: Scalar, v: Scalar) -> tuple[Scalar, Scalar]:
         """The drive nearest to v that the amplifier reaches in one step from `before` with rounding remainder `rest`,
-        and its own remainder."""
+        and the new drive's remainder."""
         if v > before or (v == before and rest < 0):
             drive, left = ramp(before, rest, t.number.slew_rising[0], t.number.slew_rising_rest[0])
             beyond = v > drive or (v == drive and left < 0)
@@ -387,7 +387,7 @@ def made_of(
 
     @jit
     def inverse_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
-        """The drive in reach nearest to v, or the one from which a lag does not overshoot."""
+        """The reachable drive nearest to v, or the one from which a lag does not overshoot."""
         if not t.slew or not s.own.moving[0]:
             return v
         near, rest = inverse_within(t, s, v)
@@ -401,7 +401,7 @@ def made_of(
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Scalar) -> None:
-        """Absorb drive v: it passes the delay, and the amplifier follows."""
+        """Absorb drive v, after the delay and the amplifier's slew limit."""
         late = sent_absorb(t, s, v) if s.own.moving[0] else sent_rest(t, s, v)
         reached = forward_slewed(t, s, late)
         if reached != late:
@@ -420,7 +420,7 @@ def made_of(
 
     @jit
     def inverse_put(t: ChainTables, s: ChainState, level: Scalar) -> Scalar:
-        """Take the next reference, already limited, through the preview if there is one. Returns the output to reach at
+        """Pass the next reference, already limited, through the preview if there is one. Returns the output to reach at
         this sample."""
         if t.quiet:
             quiet_count(t, s, level_signal(t, level))
@@ -436,7 +436,7 @@ def made_of(
 
     @jit
     def inverse_push(t: ChainTables, s: ChainState, u: Scalar) -> None:
-        """Take the next reference of the preview without answering it."""
+        """Put the next reference into the preview without answering it."""
         if not finite(t, u):
             s.plays.step.status[0] |= HELD
             unread(t, s)
@@ -448,12 +448,12 @@ def made_of(
 
     @jit(inline=True)
     def unread(t: ChainTables, s: ChainState) -> None:  # noqa: ARG001  the same call for every chain
-        """Repeat the newest reference in place of one that is not finite."""
+        """Repeat the newest reference instead of one that is not finite."""
         preview_repeat(s.line)
 
     @jit(inline=True)
     def stands(t: ChainTables, s: ChainState, u: Scalar) -> bool:  # noqa: ARG001
-        """Never: every reference is answered anew, since time has passed for the effects."""
+        """False: every reference needs a new answer, since time has passed for the effects."""
         return False
 
     @jit
@@ -493,7 +493,7 @@ def made_of(
 
     @jit
     def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
-        """Set the offset of the displacement; drift starts again."""
+        """Set the offset of the displacement, and restart drift."""
         put_offset(t, s, d)
         if finite(t, d):
             for j in range(s.counts[CLOCK]):
@@ -506,11 +506,11 @@ def made_of(
         put_offset(t, s, s.own.offset[0] + more)
 
     def setting(put: Check) -> Action:
-        """A call that sets a number of the blocks by `put`."""
+        """A call that sets a number in the blocks by `put`."""
 
         @jit
         def set_number(t: ChainTables, s: ChainState, x: Scalar) -> None:
-            """Set it, within its limits."""
+            """Set the number, within its limits."""
             if not finite(t, x):
                 s.plays.step.status[0] |= HELD
             elif put(t, s, x):
@@ -524,7 +524,7 @@ def made_of(
 
     @jit
     def start_at(t: ChainTables, s: ChainState, after: int) -> None:
-        """Start where the plays are, after init (0) or reset (1)."""
+        """Start from the present plays, after init (0) or reset (1)."""
         start(t, s, after)
         begin(t, s)
         if not s.own.inverse[0]:

@@ -1,6 +1,6 @@
-"""The parts of a step of a model with effects that are specific to fixed point, where signals have bits below codes.
+"""The parts of a step of a model with effects that are specific to fixed point, where signals have bits below a code.
 
-Signals in front of the plays are in units of their input, signals behind the plays in fractions of an output code.
+Signals in front of the plays are in units of the plays' input, signals behind them in fractions of an output code.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def output_code(t: FixedChainTables, y: int) -> tuple[int, int]:
 
 @jit
 def entered_travel(t: FixedChainTables, x: int) -> int:  # noqa: ARG001  as in floating point
-    """A travel in drive codes for an argument that is a code."""
+    """The travel in drive codes for a code given as argument."""
     return x << TRAVEL_BITS
 
 
@@ -149,7 +149,7 @@ led_braked: Callable[..., int] = led.braked
 
 @jit
 def braked(t: FixedChainTables, s: ChainState, v: int, near: int) -> int:
-    """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
+    """The drive from which the lag does not overshoot, if `near` can be reached instead of v."""
     bits = t.number.drive_bits[0]
     beyond = v - near if v > near else near - v
     falling, rising = t.number.slew_falling[0] << bits, t.number.slew_rising[0] << bits
@@ -164,7 +164,7 @@ def braked(t: FixedChainTables, s: ChainState, v: int, near: int) -> int:
 
 @jit
 def ramp(before: int, rest: int, move: int, more: int) -> tuple[int, int]:
-    """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
+    """The drive one step of `move` and `more` after `before` with rounding remainder `rest`, and the new remainder."""
     left = rest + more
     whole = (left + (1 << (REST_BITS - 1))) >> REST_BITS
     return before + move + whole, left - (whole << REST_BITS)

@@ -23,7 +23,7 @@ def bent(t: Stages, x: Scalar) -> Scalar:
 
 @jit(inline=True)
 def unbent(t: Stages, y: Scalar) -> tuple[Scalar, int]:
-    """The input of the saturation that gives y, and whether there is none."""
+    """The input of the saturation that gives y, and whether no such input exists."""
     return front_inverse(t, y, 1)
 
 
@@ -35,7 +35,7 @@ def entered(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fi
 
 @jit(inline=True)
 def finer(t: FloatChainTables, s: ChainState, h: Scalar, w: Scalar, a: Scalar) -> Scalar:  # noqa: ARG001  as in fixed point
-    """The signal in front of the plays, which is already as fine as it gets."""
+    """The signal in front of the plays, which already has all its bits."""
     return a
 
 
@@ -61,7 +61,7 @@ HALVES = led.halves
 
 @jit
 def braked(t: FloatChainTables, s: ChainState, v: Scalar, near: Scalar) -> Scalar:
-    """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
+    """The drive from which the lag does not overshoot, if `near` can be reached instead of v."""
     beyond = v - near if v > near else near - v
     falling, rising = t.number.slew_falling[0], t.number.slew_rising[0]
     return led_braked(t.blocks[LED], s.blocks[LED], near, beyond, falling, rising, HALVES)
@@ -72,7 +72,7 @@ def braked(t: FloatChainTables, s: ChainState, v: Scalar, near: Scalar) -> Scala
 
 @jit
 def ramp(before: Scalar, rest: Scalar, move: Scalar, more: Scalar) -> tuple[Scalar, Scalar]:
-    """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
+    """The drive one step of `move` and `more` after `before` with rounding remainder `rest`, and the new remainder."""
     following = before + move
     moved = following - before
     left = ((before - (following - moved)) + (move - moved)) + (rest + more)

@@ -1,4 +1,4 @@
-"""The numbers that the operators of a model with effects work with, in one arithmetic."""
+"""The constants of the operators of a model with effects, in one arithmetic."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def build(
     """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`; `engine`:
     'corners' or 'loop', for plays that no effect moves or bends.
 
-    None of its effects is among the `refusals`. The result is shared by all who ask for the same: checking a model,
-    writing its C and running its reference each ask. Raises FormatError if a number does not fit the arithmetic.
+    None of its effects is among the `refusals`. Results are cached, since checking a model, writing its C and running
+    its reference each need the same tables. Raises FormatError if a number does not fit the arithmetic.
     """
     if ARITHMETICS[arithmetic].fixed:
         return fixed_tables.build(chain, arithmetic, seconds, how, lsb, engine)

@@ -31,7 +31,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
-    """Answer any sample except a usual one."""
+    """Answer any sample that is not usual."""
     x = u - t.limits[OFFSET]
     bits = 0
     copy_place(m.undo, m.here)
@@ -78,7 +78,7 @@ def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
-    """Replace the last answer by the drive that was really applied."""
+    """Replace the last answer by the drive that was actually applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.step.status[0] |= HELD

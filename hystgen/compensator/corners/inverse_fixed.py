@@ -31,7 +31,7 @@ def inverse_along(m: FixedMemory, u: int) -> int:
 
 @jit
 def inverse_stay(m: FixedMemory) -> None:
-    """Make no step usual before another search, which begins here."""
+    """Make no step usual until the next search, which begins here."""
     m.step.next[0] = NEVER
     m.step.usual[0] = 0
 
@@ -52,7 +52,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: int) -> None:
 
 @jit
 def inverse_search(t: FixedTables, m: FixedMemory, u: int) -> int:
-    """Answer any sample except a usual one."""
+    """Answer any sample that is not usual."""
     copy_place(m.undo, m.here)
     m.step.usual[0] = 0
     if not (m.step.repeated[0] and u == m.step.reference[0]):
@@ -89,7 +89,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: int) -> None:
-    """Replace the last answer by the drive that was really applied."""
+    """Replace the last answer by the drive that was actually applied."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.step.status[0] |= INPUT_CLAMPED

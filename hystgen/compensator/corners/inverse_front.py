@@ -30,7 +30,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_keep(m: Memory | FixedMemory) -> None:
-    """Keep the place to which a commit goes back."""
+    """Keep the position to which a commit returns."""
     copy_place(m.undo, m.here)
     m.step.undo_drive[0] = m.step.drive[0]
     m.step.undo_ascending[0] = m.step.ascending[0]
@@ -38,7 +38,7 @@ def inverse_keep(m: Memory | FixedMemory) -> None:
 
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Scalar) -> None:
-    """Undo the last step: the actuator went to v instead."""
+    """Undo the last step, since the actuator went to v instead."""
     take_back(t.inverse, m)
     m.step.drive[0] = m.step.undo_drive[0]
     m.step.ascending[0] = m.step.undo_ascending[0]
@@ -95,7 +95,7 @@ def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
-    """Replace the last answer by the drive that was really applied."""
+    """Replace the last answer by the drive that was actually applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.step.status[0] |= HELD

@@ -44,7 +44,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: int) -> None:
-    """Replace the last answer by the drive that was really applied."""
+    """Replace the last answer by the drive that was actually applied."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.step.status[0] |= INPUT_CLAMPED

@@ -50,7 +50,7 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
     return inside != travel;
 }
 
-/* Sets a gain in place of the one that follows the travel. Returns whether it had to be limited. */
+/* Sets a gain that replaces the one from the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                hystgen_real_t gain) {
     const int64_t given = (int64_t)gain * ((int64_t)1 << t->bits);

@@ -34,18 +34,18 @@ from hystgen.plays.slots import Counts, firsts, zero
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
 DECADES = 6
-"""[decades of the longest travel] Range of a gain's table; beyond it the gain keeps its last value. A law with a travel
-of a few moves over the range is then covered for a million times as many, in 65 pieces (1560 bytes in float32) where
-the gain falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
+"""[decades above the longest travel] Range of a gain's table; beyond it the gain keeps its last value. A law whose
+travel is a few moves over the range is then covered for a million times as many, in 65 pieces (1560 bytes in float32)
+if the gain falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
 """[share of the output] Largest difference between a table and its gain, about the rounding of ten operations in
-float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times its beginning: `0.05/2.3 * 6/384 *
-0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
+float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times the travel at which it begins:
+`0.05/2.3 * 6/384 * 0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
 
 
 def gain(effect: Ageing, travelled: float) -> float:
-    """The gain after a travel, input units."""
+    """The gain after a travel in input units."""
     if isinstance(effect, LogarithmicAgeing):
         return 1.0 - effect.loss * math.log10(1.0 + min(travelled / effect.travel, 1e300))
     if isinstance(effect, ExponentialAgeing):
@@ -65,7 +65,7 @@ def steepness(effect: Ageing, travelled: float) -> float:
 
 
 class AgeingPiece(Struct):
-    """A piece of the gain over travel: a cubic in the share of its length."""
+    """A piece of the gain over travel: a cubic in the fraction of its length."""
 
     begin: Real
     inverse_length: Real
@@ -79,7 +79,7 @@ class AgeingPiece(Struct):
 def pieces(effect: Ageing) -> AgeingPiece:
     """The gain as cubic pieces (m,) in double precision.
 
-    A piece matches the gain's values and slopes at its ends, and is as long as TABLE_ERROR allows.
+    Each piece matches the gain's values and slopes at its ends and is as long as TABLE_ERROR allows.
     """
     several = isinstance(effect, SeveralAgeing)
     travels = effect.travels if several else (effect.travel,)  # type: ignore[union-attr]
@@ -123,7 +123,7 @@ def most_at_once(effect: Ageing, span: float) -> float:
 def problems(effect: Ageing, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     if effect in at.listed[1:]:
-        yield "one gain follows the travel, and there is another one"
+        yield "the model has more than one gain that follows the travel"
         return
     change = most_at_once(effect, at.ends[1] - at.ends[0])
     if len(pieces(effect)) == 0 or change > MOST_CHANGE:
@@ -137,16 +137,16 @@ class Aged(One):
     effect: Ageing
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """Properties of the gain; the C reads the gain at the travel one sample earlier, from a table."""
+        """Properties of the gain; the C takes the gain from a table, at the travel one sample earlier."""
         late = most_at_once(self.effect, speed.step) + TABLE_ERROR if emitted else 0.0
         return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, TABLE_ERROR * output * emitted, late * output)
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size * LARGEST_GAIN
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that the inverse gives for outputs within `asked`."""
+        """Largest answer of the inverse for outputs up to `asked`."""
         return asked / LEAST_GAIN
 
 
@@ -154,7 +154,7 @@ class Aged(One):
 
 
 class AgeingTable(Struct):
-    """Gain over travel up to `last`; one set from outside lies between `least` and `largest`."""
+    """Gain over travel up to `last`; a gain that the caller sets lies between `least` and `largest`."""
 
     least: Real
     largest: Real
@@ -164,7 +164,7 @@ class AgeingTable(Struct):
 
 
 class AgeingNumbers(AgeingTable):
-    """The same with numbers that are not in the table in C."""
+    """The same with constants that are not in the table in C."""
 
     one: Real
     two: Real
@@ -221,7 +221,7 @@ class UnevenAgeing:
         return y / gain(self.effect, self._travel(before, drive))
 
     def move(self, before: float, drive: float, seconds: float) -> None:
-        """The drive has gone there."""
+        """Note that the drive has moved from `before` to `drive`."""
         self.travelled = self._travel(before, drive)
 
 
@@ -267,7 +267,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -
 
 @jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
-    """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
+    """Set a gain that replaces the one from the travel. Returns whether it had to be limited."""
     inside = gain
     if inside < t.block.least[j]:
         inside = t.block.least[j]
@@ -281,7 +281,7 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
 
 @jit
 def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scalar) -> None:
-    """The drive has moved to v."""
+    """Note that the drive has moved from `before` to v."""
     way = v - before
     change = (way if way >= zero(way) else -way) + s.low[j]
     high = s.high[j]
@@ -319,7 +319,7 @@ def verbs(
 
     @jit
     def reset(t: AgeingTables, s: AgeingState, j: int) -> None:
-        """Return to the state of the parameter file: nothing has been travelled."""
+        """Return to the state of the parameter file, a travel of 0."""
         set_travel(t, s, j, zero(t.block.last[j]))
 
     @jit
@@ -343,6 +343,6 @@ PART = ChainPart(
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
     problems=problems, code=("ageing",), following=UnevenAgeing, longest=lambda t: float(t.block.last[0]),
 )
-"""Ageing as a part of the chain: a gain over the travel, which the caller may set."""
+"""Ageing as a part of the chain: a gain that depends on the travel, which the caller may set."""
 
 PARTS = (PART,)

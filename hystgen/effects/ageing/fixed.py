@@ -29,21 +29,21 @@ from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Re
 from hystgen.plays.slots import Counts, firsts, zero
 
 SHARE_BITS = 20
-"""Fraction bits of the share of a piece; the gain changes by a hundredth along a piece, so it gets 27."""
+"""Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""
 
 CUBIC_ERROR = 8.0 * 2.0**-GAIN_BITS
-"""[share of the signal] Error of a gain from a cubic piece: four coefficients and products, and a share rounded to 20
-bits while the gain changes by a hundredth."""
+"""[share of the signal] Error of a gain from a cubic piece: four coefficients and products, and a fraction of the
+length rounded to 20 bits, over which the gain changes by a hundredth."""
 
 LONGEST = 2**61
-"""Most drive codes that a travel counts, 5e8 times a range in q31; beyond, the gain keeps its last value."""
+"""[drive codes] Largest travel that is counted, 5e8 ranges in q31; beyond it the gain keeps its last value."""
 
 
 class FixedAgeingPiece(Struct):
-    """A piece of the gain over travel: a cubic in the share of its length."""
+    """A piece of the gain over travel: a cubic in the fraction of its length."""
 
     begin: Int64
-    share: Factor  # of the travel since `begin`, less the bits that the product leaves out
+    share: Factor  # of the travel since `begin`, without the bits that the product drops
     drop: UInt8
     c: FourInt32
 
@@ -54,7 +54,7 @@ class FixedAgeingTable(Struct):
     last: Int64
     n: Count
     turns: UInt8  # Newton steps for the reciprocal of a gain that has changed
-    bits: UInt8  # of a gain below a code that sets it
+    bits: UInt8  # of a gain below the code that sets it
 
 
 class FixedAgeingState(Struct):
@@ -80,9 +80,9 @@ class FixedAgeingTables(NamedTuple):
 
 
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
-    """Pieces of the gain and Newton steps of each ageing effect, for drive codes of `lsb`.
+    """Tables from the pieces of the gain and the Newton steps of each ageing effect, for drive codes of `lsb`.
 
-    `bits`: how many bits a gain has below the code that sets it. Raises OverflowError.
+    `bits`: of a gain below the code that sets it. Raises OverflowError if a number does not fit.
     """
     piece: list[tuple[object, ...]] = []
     block = []
@@ -111,7 +111,7 @@ class AgeingFormats(Coded):
     turns: int
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """The gain's properties, for inputs within a size."""
+        """The gain's properties, for inputs up to `size`."""
         begun = 0.5 * at.drive_lsb * abs(floating.steepness(self.one.effect, 0.0))  # pieces begin at whole codes
         wrong = floating.TABLE_ERROR + begun + CUBIC_ERROR
         late = floating.most_at_once(self.one.effect, speed.step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
@@ -164,7 +164,7 @@ def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel:
 
 @jit
 def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: int) -> bool:
-    """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
+    """Set a gain that replaces the one from the travel. Returns whether it had to be limited."""
     given = gain << t.block.bits[j]
     inside = given
     if inside < LEAST:
@@ -179,7 +179,7 @@ def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: int) -> 
 
 @jit
 def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: int, v: int) -> None:
-    """The drive has moved to v."""
+    """Note that the drive has moved from `before` to v."""
     way = v - before
     following = s.high[j] + (way if way >= 0 else -way)
     if following > t.block.last[j]:

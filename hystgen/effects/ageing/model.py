@@ -14,10 +14,10 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 EXPONENTIAL = "ageing, exponential"
 
 LEAST, MOST, APART = -3.0, 1.0, 0.6
-"""[decimal logarithms of travels over the recorded one] Bounds of a search, and half the distance between two starting
-points. A thousandth of the travel is two sweeps of a recording of 2000; with ten times the travel, only a tenth of an
-exponential loss is seen, which is a straight line to within 5 % and does not determine loss and travel. Two travels
-start a factor of 16 apart, well inside the four decades. Changed by: blind single (ageing)."""
+"""[decimal logarithms of travels relative to the recorded travel] Bounds of a search, and half the distance between two
+starting points. A thousandth of the travel is two sweeps of a recording of 2000; at ten times the travel, only a tenth
+of an exponential loss is seen, which is a straight line to within 5 % and does not determine loss and travel. Two
+travels start a factor of 16 apart, well inside the four decades. Changed by: blind single (ageing)."""
 
 
 class _Ageing(Effect):
@@ -31,7 +31,7 @@ class _Ageing(Effect):
 
     @classmethod
     def _candidate(cls, label: str, about: About) -> Candidate:
-        """A loss only: a stage that gains over its travel has another reason to, such as the room's temperature."""
+        """Only a loss: if the gain rises with travel, the cause is something else, such as the room's temperature."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> Effect:
@@ -48,7 +48,7 @@ class _Ageing(Effect):
 class LogarithmicAgeing(_Ageing):
     """Gain `1 - loss log10(1 + D/travel)`, D the distance travelled since the start of the session.
 
-    The logarithmic law of depolarisation, which data sheets quote per decade, over travel instead of time.
+    The logarithmic law of depolarisation, which data sheets quote per decade, but over travel instead of time.
     """
 
     shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss per decade of travel")
@@ -88,10 +88,9 @@ class ExponentialAgeing(_Ageing):
 
 
 class SeveralAgeing(_Ageing):
-    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear at different speeds.
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at different distances, as wear at several speeds.
 
-    With two of them it can follow laws between the exponential and the logarithmic one, which spread over decades of
-    travel.
+    Two losses can follow laws between the exponential and the logarithmic law, which spreads over decades of travel.
     """
 
     shape: Literal["exponentials"] = Field(description="losses that come to an end at several distances")
@@ -103,7 +102,7 @@ class SeveralAgeing(_Ageing):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One loss for each travel."""
+        """The problem of not having one loss for each travel."""
         yield from not_as_many("losses", self.losses, "travels", self.travels)
 
     def gain(self, run: Run) -> Array:
@@ -115,7 +114,7 @@ class SeveralAgeing(_Ageing):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Two losses and travels, tried if one exponential explains a part of the error."""
+        """Two losses and travels, tried if a single exponential explains part of the error."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> SeveralAgeing:
@@ -135,7 +134,7 @@ class SeveralAgeing(_Ageing):
 
 
 def _worn(run: Run, travel: float) -> Array:
-    """`exp(-D/travel) - 1`; a search changes the loss more often than the travel."""
+    """`exp(-D/travel) - 1`, cached: a search changes the loss more often than the travel."""
     return run.remembered(("worn", travel), lambda: np.asarray(np.expm1(-run.travelled / travel)))
 
 

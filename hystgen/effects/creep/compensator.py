@@ -1,4 +1,4 @@
-"""Creep as a block: exactly invertible, since each state follows a move at once by a known share."""
+"""Creep as a block: exactly invertible, since each state immediately follows a known share of a move."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
         yield (
             f"creep, logarithmic: with per_decade = {effect.per_decade:g}, t0 = {effect.t0:g} s and t_min = "
             f"{effect.t_min:g} s nothing of a step arrives at once ({effect.at_once:.3g} of it); give a t0 nearer to "
-            "t_min, or a smaller share"
+            "t_min, or a smaller per_decade"
         )
 
 
@@ -38,8 +38,8 @@ class CreepNumbers(One):
     double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): 1 - E, c b0,
     c b1, c of each state.
 
-    Solved, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`: for d > 0 the inverse is stable
-    whatever the time constants are, since the response is strictly positive real.
+    The inverse, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`, is stable for d > 0 and any time
+    constants, since the response is strictly positive real.
     """
 
     slope: float  # d + sum c_i b1_i
@@ -52,7 +52,7 @@ class CreepNumbers(One):
 
     @property
     def growth(self) -> float:
-        """Largest output for inputs within 1."""
+        """Largest output for inputs of magnitude at most 1."""
         return self.rest
 
     @property
@@ -68,7 +68,7 @@ class CreepNumbers(One):
         return 1.0 / around if around > 0.0 else 2.0 / self.slope - 1.0 / self.rest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the inverse itself."""
+        """Roundings of the output for inputs up to `size`, and of the inverse itself."""
         rate, weight = self.terms[:, RATE], self.terms[:, WEIGHT]
         states = (16.0 + len(self.terms)) * float(np.sum(weight)) + u * float(np.sum(weight / rate))
         found = u * size * (states + 4.0 * self.rest)
@@ -79,7 +79,7 @@ class CreepNumbers(One):
         return (1.0 / self.slope if same else self.backward) * (error + self.rounding(size, u)[1])
 
     def seen(self) -> float:
-        """Factor by which states that follow the input multiply an error of the input."""
+        """Factor by which states that follow the input amplify an error of the input."""
         return self.slope * self.backward
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
@@ -90,11 +90,11 @@ class CreepNumbers(One):
         return found._replace(passed=passed, direct=found.direct * self.slope, rest=found.rest * self.rest)
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size * self.rest * margin.slack + 1.0
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
+        """Largest answer of the inverse for outputs up to `asked`, after inputs up to `given`."""
         moved = given + (asked + given * self.rest) / self.slope
         return max(moved, asked / self.rest) * margin.slack + 1.0
 
@@ -115,8 +115,8 @@ def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> Cree
 def shares(terms: Array) -> Array:
     """Constants (m, 2) of the states in floating point: 1 - E, and `k = c (1 - b1)`.
 
-    A state's share of the next output at an input of 0, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`, since `b0
-    + b1 = 1 - E`.
+    A state's contribution to the next output for an input of 0, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`,
+    since `b0 + b1 = 1 - E`.
     """
     return np.column_stack([terms[:, RATE], terms[:, WEIGHT] - terms[:, LATE]])
 
@@ -125,7 +125,7 @@ def shares(terms: Array) -> Array:
 
 
 class CreepTerm(Struct):
-    """What a state of creep adds to the next output by inputs up to now: X += rate (share h - X)."""
+    """The contribution of a creep state to the next output, for inputs up to now: X += rate (share h - X)."""
 
     rate: Real
     share: Real
@@ -134,7 +134,7 @@ class CreepTerm(Struct):
 class CreepTable(Struct):
     """Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the sample before."""
 
-    slope: Real  # change of y with h at once
+    slope: Real  # immediate change of y with h
     inverse_slope: Real
     rest: Real  # y over h at rest
     inverse_rest: Real
@@ -186,7 +186,7 @@ def tables(blocks: Sequence[CreepNumbers], reals: Callable[[ArrayLike, str], NDA
 
 @jit
 def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
         settled = t.term.share[i] * x
@@ -211,7 +211,7 @@ def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -243,7 +243,7 @@ class UnevenCreep(Block):
         self.state: CreepMemory = memory_of(CreepMemory)(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
-        """The `tables` of a step, whose states are advanced to the next output by the E and b0 of the next step; they
+        """The `tables` of a step; its states are advanced to the next output with the E and b0 of the next step, and
         see a share `(E b1 + b0)/(1 - E)` of an input, with the b1 of this step."""
         now, following = self._numbers(seconds), self._numbers(later)
         rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
@@ -253,7 +253,7 @@ class UnevenCreep(Block):
         return found
 
     def advance(self, seconds: float, later: float | None = None) -> None:
-        """The numbers of this step and the next."""
+        """Set the constants for this step and the next."""
         self.table = self._tables(seconds, later or seconds)
 
     def call(self, verb: str, x: float) -> float:

@@ -4,7 +4,7 @@
    compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
-/* Everything has settled at the input x. Returns the output. */
+/* Settles everything at the input x. Returns the output. */
 static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                          hystgen_creep_state_t *state, hystgen_real_t x) {
     hystgen_real_t ahead = 0;
@@ -30,7 +30,7 @@ static hystgen_real_t hystgen_creep_solve(const hystgen_creep_table_t *t,
     return (y - self->ahead) * t->inverse_slope;
 }
 
-/* The input is x at this sample. Returns the output. */
+/* Takes the input x at this sample. Returns the output. */
 static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                            hystgen_creep_state_t *state, hystgen_real_t x) {
     const hystgen_real_t y = self->ahead + t->slope * x;

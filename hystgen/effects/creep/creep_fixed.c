@@ -6,7 +6,7 @@
 #include "compensator/chain/model.h"
 #include "arithmetic/factors.c"
 
-/* Everything has settled at the input x. Returns the output. */
+/* Settles everything at the input x. Returns the output. */
 HYSTGEN_APART int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                          hystgen_creep_state_t *state, int64_t x) {
     int64_t sum = 0;
@@ -49,8 +49,8 @@ HYSTGEN_APART int64_t hystgen_creep_next(const hystgen_creep_table_t *t, hystgen
     return y;
 }
 
-/* The input is x at this sample. Returns the output. Two short functions, the first of which ends
-   with a call of the second, need less stack than a long one. */
+/* Takes the input x at this sample. Returns the output. Two short functions, the first of which
+   ends with a call of the second, need less stack than a long one. */
 HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                            hystgen_creep_state_t *state, int64_t x) {
     const int64_t change = x - self->before;

@@ -1,7 +1,7 @@
 """Creep as a block in fixed point: 64-bit states that predict the next sample for an unchanged input.
 
 With `A` the prediction, `X = A + c b1 (x - before)` and `A <- X + (1 - E)(c x - X)`, the same recursion as in floating
-point. At rest every state is `c x` whatever its rate is, and it approaches that by a real positive pole, so that
+point. At rest every state is `c x`, whatever its rate, and it approaches this value with a real positive pole, so
 rounding leaves a dead band but no limit cycle.
 """
 
@@ -26,23 +26,23 @@ from hystgen.plays.slots import Counts, firsts, zero
 
 
 class FixedCreepTerm(Struct):
-    """A state of creep: its contribution at the next sample approaches weight times the input by `rate` in each
+    """A state of creep: its contribution to the next output approaches weight times the input, by a share `rate` per
     step."""
 
     rate: Factor
-    late: Factor  # share of a change of the input that counts at once
+    late: Factor  # share of a change of the input that acts at once
     weight: Factor
-    lift: UInt8  # bits of a state that the product with `late` leaves out
+    lift: UInt8  # bits of a state that the product with `late` drops
 
 
 class FixedCreepTable(Struct):
     """Creep behind the plays: y = d h + X_1 + X_2 + ..."""
 
     direct: Factor  # d
-    inverse_slope: Factor  # 1 / (change of y with h at once)
+    inverse_slope: Factor  # 1 / (immediate change of y with h)
     inverse_rest: Factor  # h over y at rest
     bits: UInt8  # bits of the states below those of a signal,
-    drop: UInt8  # and bits that products leave out
+    drop: UInt8  # and bits that products drop
     n: Count
 
 
@@ -56,7 +56,7 @@ class FixedCreepState(Struct):
     """A block."""
 
     before: Int64  # input of the last sample
-    ahead: Int64  # output of the next one for the same input
+    ahead: Int64  # output of the next sample for the same input
 
 
 KIND = Kind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
@@ -80,7 +80,7 @@ class FixedCreepMemory(NamedTuple):
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     """Bits of the states below a signal's, and those dropped before a product, for inputs up to `size`.
 
-    `code`: bits of a signal below an output code. Raises OverflowError where the slowest state would stall more than a
+    `code`: bits of a signal below an output code. Raises OverflowError if the slowest state would stall more than a
     quarter of a code from its target.
     """
     slowest = float(np.min(effect.terms[:, 0]))
@@ -106,7 +106,7 @@ class CreepFormats(Coded):
         return self.one.rest - math.fsum(self.one.terms[:, 3].tolist())
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs within a size, with signals of this unit."""
+        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
         state, found = 2.0**-self.bits * signal, 0.0
         for rate, _, late, weight in self.one.terms.tolist():
             scale = 2.0 ** (self.bits - lifted(late, self.bits))
@@ -125,12 +125,12 @@ class CreepFormats(Coded):
         return gain * (error + self.there(at.size, at.signal) + own + states)
 
     def residual(self, missed: float, same: bool) -> float:
-        """Error of the output after the inverse, for an error of the play sum."""
+        """Error of the output after the inverse that results from an error of the play sum."""
         return missed * (self.one.slope * (1.0 / self.one.slope if same else self.one.backward))
 
 
 def formats(one: CreepNumbers, about: FixedSurroundings, given: float, _: float) -> CreepFormats:
-    """A block for inputs up to `given` output codes. Raises OverflowError where states have no room."""
+    """A block for inputs up to `given` output codes. Raises OverflowError if the states do not fit."""
     return CreepFormats(one, *guard(one, given * 2.0**about.bits, about.bits))
 
 
@@ -153,7 +153,7 @@ def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTa
 
 @jit
 def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
         state = times(x, t.term.weight.mantissa[i], t.term.weight.shift[i]) << t.block.bits[j]
@@ -180,7 +180,7 @@ def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int
 
 @jit
 def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     change = x - s.block.before[j]
     direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])
     total = zero(x)

@@ -1,4 +1,4 @@
-"""Creep: slow motion after a move, of the play sum as a whole."""
+"""Creep: slow motion of the play sum as a whole after a move."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from hystgen.basics.quantities import NotNegative, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 
 FASTEST = 0.01
-"""[s] Motion that follows a move faster than this is a lag or domain-wall friction, not creep."""
+"""[s] Motion that settles faster than this after a move is due to a lag or domain-wall friction, not creep."""
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
-"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that; when there are few
-states, one of them represents up to three decades. Set by: 16 blind plants with creep (`make blind FIRST=97000`): with
-half the first, one gets no name and two are 3 and 7 % worse; with half the second, one is 5 % worse; twice either
+"""Largest shares to try: stages creep by 1 to 2 % per decade, some by up to three times that; with few states, each
+represents up to three decades. Set by: 16 blind plants with creep (`make blind FIRST=97000`): with half the first, the
+creep of one plant is not named and two are 3 and 7 % worse; with half the second, one is 5 % worse; doubling either
 changes none by 2 %."""
 
 SHORTER = 1.0
 """[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
-by: the same plants; half improves one by 2 %, twice changes none."""
+by: the same plants; half of it improves one by 2 %, twice changes none."""
 
 SHORTEST = 0.3
-"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. Recorded times
+"""[decades] Minimum width of such a spectrum: a factor of two, less than each of its states represents. Recorded times
 (`span`) are never narrower."""
 
 LOGARITHMIC = "creep, logarithmic"
 
 PER_DECADE = 2
-"""States per decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
+"""States per decade of a logarithmic spectrum; their ripple about a straight line over log t is 0.1 % of its slope."""
 
 
 @jit
@@ -45,9 +45,9 @@ def creep(
 ) -> None:
     """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
-    `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): where the filters
-    begin. Several columns, or all filters of one column, run side by side, since each alone waits for its own previous
-    sample.
+    `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): initial states of the
+    filters. Several columns, or all filters of one column, run in parallel, since a single recursion would stall on its
+    previous sample.
     """
     taus, rows = states.shape
     for j in range(taus):
@@ -96,7 +96,7 @@ class _Creep(Effect):
 
 
 class ExponentialCreep(_Creep):
-    """Creep in parallel to the plays: `y = h + sum c_i x_i`, `tau_i x_i' = h - x_i`.
+    """Creep added to the play sum: `y = h + sum c_i x_i`, `tau_i x_i' = h - x_i`.
 
     Springs and dampers in series behind the play sum `h` (Croft, Shed, Devasia: Creep, hysteresis, and vibration
     compensation for piezoactuators, J. Dyn. Sys., Meas., Control 123, 2001). A record starts settled: `x_i = h`.
@@ -111,7 +111,7 @@ class ExponentialCreep(_Creep):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One weight for each time constant."""
+        """The problem of not having one weight for each time constant."""
         yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
 
     def time_scale(self, drive_range: float) -> float:
@@ -127,12 +127,12 @@ class ExponentialCreep(_Creep):
         return _fading(run, np.array(self.time_constants))
 
     def largest(self, run: Run) -> Array:
-        """A state lags behind the play sum by its span at most."""
+        """One span each: a state lags behind the play sum by at most its span."""
         return np.array(self.weights)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One state, two, and three if two help; time constants from a few samples to beyond the session."""
+        """One state, then two, and three if two help; time constants from a few samples to beyond the session."""
         low, high = span(max(4.0 * about.sample_time, FASTEST), 3.0 * about.session)
 
         def build(x: Array) -> ExponentialCreep:
@@ -166,8 +166,8 @@ class LogarithmicCreep(_Creep):
 
     The law is from the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric actuators
     for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal weights and
-    time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full height at
-    t_0.
+    time constants spaced evenly over log t from t_min to t_max, and a gain chosen so that a step reaches its full
+    height at t_0.
     """
 
     shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
@@ -179,7 +179,7 @@ class LogarithmicCreep(_Creep):
     settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """t_min < t_max, at most 12 decades apart."""
+        """The problem of t_min and t_max unless t_min < t_max, at most 12 decades apart."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:
@@ -199,7 +199,7 @@ class LogarithmicCreep(_Creep):
 
     @property
     def at_once(self) -> float:
-        """Share of a step that arrives at once, chosen so that its height is full at t_0."""
+        """Share of a step that arrives at once, chosen so that the step reaches its full height at t_0."""
         tau, weight = self.spectrum()
         return 1.0 - weight * float(np.sum(-np.expm1(-self.t0 / tau)))
 
@@ -209,17 +209,17 @@ class LogarithmicCreep(_Creep):
         return self.at_once * h + _states(h, run, tau, np.full(len(tau), weight))
 
     def transients(self, run: Run) -> Array:
-        """`exp(-t/tau_i)` for one time constant per decade, enough for any start of the spectrum."""
+        """`exp(-t/tau_i)` for one time constant per decade, enough for any start state of the spectrum."""
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """Each represents the states of a decade, which lag behind the play sum by at most its span."""
+        """One decade's weight each: its states lag behind the play sum by at most its span."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share per decade over the whole recorded time; if it helps, with free ends of the spectrum."""
+        """The share per decade over the whole recorded time; then, if that helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays absorb
@@ -238,7 +238,7 @@ class LogarithmicCreep(_Creep):
             )
 
         wide = high - low
-        inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session does not have that many decades
+        inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session may span fewer decades
         return [
             Candidate(
                 LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1),

@@ -1,6 +1,6 @@
-"""A delay in the forward operator: drives wait in a ring, and are straight between samples.
+"""A delay in the forward operator: drives wait in a ring buffer, and are linear between samples.
 
-The inverse has it in its preview (`hystgen.compensator.chain.preview`).
+The inverse accounts for it in its preview (`hystgen.compensator.chain.preview`).
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from hystgen.effects.part import ChainPart, One, Realized, Setting, Surroundings
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
-"""Most samples that a drive may wait: within a 16-bit counter, and more memory than small cores have."""
+"""[samples] Longest delay: it fits a 16-bit counter, and takes more memory than small cores have."""
 
 
 class DelayTables(NamedTuple):
-    """`share` (1,): how much of the step after the oldest sample is over; in fixed point a factor (2,); `samples`: how
-    many wait, 0 without a delay."""
+    """`share` (1,): elapsed share of the step after the oldest sample, in fixed point a factor (2,); `samples`: the
+    number that wait, 0 without a delay."""
 
     share: Reals
     samples: int
 
 
 class Waiting(NamedTuple):
-    """The samples that wait (n,), and the index of the oldest one (1,)."""
+    """The samples that wait (n,), and the index of the oldest (1,)."""
 
     sample: Reals
     oldest: Counts
@@ -45,7 +45,7 @@ class Wait(One):
     time: float
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the drive that leaves it."""
+        """Roundings of the delayed drive."""
         return 4.0 * u * size, 0.0
 
 
@@ -61,7 +61,7 @@ def numbers(seconds: float, step: float) -> tuple[float, int]:
 
 @jit
 def delay_rest(line: Waiting, v: Scalar) -> None:
-    """The drive has always been v."""
+    """Set the whole past of the drive to v."""
     for i in range(len(line.sample)):
         line.sample[i] = v
     line.oldest[0] = 0
@@ -69,14 +69,14 @@ def delay_rest(line: Waiting, v: Scalar) -> None:
 
 @jit
 def delay_next(line: Waiting) -> int:
-    """The index after the oldest sample's."""
+    """The index after that of the oldest sample."""
     following = line.oldest[0] + 1
     return following if following < len(line.sample) else 0
 
 
 @jit
 def delay_put(line: Waiting, v: Scalar) -> None:
-    """The drive is v at this sample."""
+    """Put the drive v of this sample into the line."""
     line.sample[line.oldest[0]] = v
     line.oldest[0] = delay_next(line)
 
@@ -105,13 +105,13 @@ def verbs(delayed: Answer) -> Verbs:
 
     @jit
     def rest(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """The drive has always been v. Returns the delayed drive."""
+        """Set the whole past of the drive to v. Returns the delayed drive."""
         delay_rest(line, v)
         return delayed(t, line)
 
     @jit
     def absorb(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """The drive is v at this sample. Returns the delayed drive."""
+        """Take the drive v of this sample. Returns the delayed drive."""
         delay_put(line, v)
         return delayed(t, line)
 
@@ -119,7 +119,7 @@ def verbs(delayed: Answer) -> Verbs:
 
 
 def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], NDArray[Any]]) -> DelayTables:
-    """The tables of a model's delays, which add up to one; `share`: converts a share to the arithmetic."""
+    """The tables of a model's delays, combined into one delay; `share`: converts a share to the arithmetic."""
     waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 

@@ -6,7 +6,7 @@
 #include "arithmetic/factors.c"
 #endif
 
-/* The drive has always been v. */
+/* Sets the whole past of the drive to v. */
 static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
     volatile hystgen_real_t *entry = sample; /* no call of memset, which a target may lack */
     unsigned int i;
@@ -21,7 +21,7 @@ static unsigned int hystgen_delay_next(unsigned int oldest) {
     return oldest + 1u < HYSTGEN_WAITING ? oldest + 1u : 0;
 }
 
-/* The drive is v at this sample. */
+/* Appends the drive v of this sample. */
 static void hystgen_delay_put(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
     sample[*oldest] = v;
     *oldest = hystgen_delay_next(*oldest);

@@ -8,7 +8,7 @@
 #endif
 
 #ifdef HYSTGEN_HAS_DELAY
-/* The drive is v at this sample. Returns the delayed drive. */
+/* Appends the drive v of this sample. Returns the delayed drive. */
 static hystgen_reach_t hystgen_forward_waited(hystgen_forward_t *self, hystgen_real_t v) {
     if (self->moving) {
         hystgen_delay_put(self->waiting, &self->oldest, v);

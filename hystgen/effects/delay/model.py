@@ -12,15 +12,15 @@ from hystgen.basics.quantities import NotNegative
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 
 FAR = (0.3, 0.4, 0.5, 0.55, 0.6, 0.7)
-"""Starts as shares of the way from no delay to the longest: the error is wavy over it, with valleys no wider than half
-a period of the fastest drive that is followed."""
+"""Starts as shares of the longest delay: over the delay the error has several minima, no wider than half a period of
+the fastest drive that is followed."""
 
 
 class Delay(Effect):
     """Pure delay `a(t) = v(t - T)` of the drive, with T any number of seconds.
 
-    The drive is a straight line between its samples, as for every effect, and constant before its first: steps do not
-    overshoot, ramps are exact, a sine of angular frequency w is off by at most (w dt)^2/8 of its amplitude.
+    The drive is linear between samples, as for every effect, and constant before the first: steps do not overshoot,
+    ramps are exact, and a sine of angular frequency w is off by at most (w dt)^2/8 of its amplitude.
     """
 
     name: Literal["delay"] = Field(description="name of the effect")

@@ -1,4 +1,4 @@
-"""Drift from the compensator's own clock: samples since it was set, counted exactly."""
+"""Drift from the compensator's own clock, which counts samples exactly since it was started."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hystgen.plays.slots import zero
 # ---------------------------------------------------------------- clock.c
 
 CARRY_SAMPLES = 2.0**24
-"""Samples that a number of 24 bits counts exactly; both numbers together last for 2^48, nine years at 1 MHz."""
+"""Samples that a 24-bit number counts exactly; two numbers together count to 2^48, nine years at 1 MHz."""
 
 
 class ClockTable(Struct):
@@ -30,10 +30,10 @@ class ClockTable(Struct):
 
 
 class ClockNumbers(ClockTable):
-    """The same with numbers that are not in the table in C."""
+    """The same with constants that are not in the table in C."""
 
     one: Real
-    most_ahead: Real  # samples by which references come ahead
+    most_ahead: Real  # samples by which references are ahead at most
 
 
 class ClockState(Struct):
@@ -56,14 +56,14 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
 
 @jit
 def clock_start(t: ClockNumbers, s: ClockState, j: int) -> None:  # noqa: ARG001  block interface
-    """Start the clock at the drive absorbed last."""
+    """Start the clock at the last absorbed drive."""
     s.high[j] = zero(s.high[j])
     s.low[j] = zero(s.low[j])
 
 
 @jit
 def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Scalar, v: Scalar) -> None:  # noqa: ARG001  block interface
-    """One sample later."""
+    """Advance by one sample."""
     following = s.low[j] + t.one[j]
     if following >= t.carry[j]:
         s.low[j] = zero(following)
@@ -94,7 +94,7 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
 
     @jit
     def lead(t: ClockNumbers, s: ClockState, j: int, filled: int) -> None:
-        """A reference has arrived: the next one lies one sample further ahead, up to the preview."""
+        """Note a new reference: the next one is one sample further ahead, up to the length of the preview."""
         following = t.one[j]
         if filled:
             following = following + s.lead[j]
@@ -110,7 +110,7 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
 
 
 def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> ClockNumbers:
-    """The numbers of the clock of a model."""
+    """The constants of a model's clock."""
     rows = about.reals([numbers(each, about.seconds, about.span, about.ahead) for each in effects], "drift")
     return ClockNumbers.of(rows, rows.dtype)
 
@@ -125,9 +125,9 @@ PART = ChainPart(
     code=("clock",),
     unmeasured=Unmeasured(
         "drift",
-        "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
+        "a clock that runs by itself, with an unknown start; set_offset takes the drift from outside, and "
         "emit.compensation.compensate: [drift] lets the module count from there",
-        "drift (a clock that runs alone; nothing says when it began",
+        "drift (a clock that runs by itself, with an unknown start",
     ),
 )
 """Drift as a part of the chain: a clock's contribution to the displacement."""

@@ -1,7 +1,7 @@
 """Drift from the compensator's own clock in fixed point: summed sample by sample, without rounding.
 
-The change per sample, and the change of that, are constants with 60 bits below a signal; the sum is kept as whole
-signals and a fraction. The clock stops once the drift has left the range of offsets for good.
+The change per sample, and the change of that change, are constants with 60 bits below a signal; the sum is kept as
+whole signals and a fraction. The clock stops once the drift has left the range of offsets for good.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**44
-"""Most samples that are counted: half a year at 1 MHz. A drift still in range by then stays where it is."""
+"""Maximum number of samples counted: half a year at 1 MHz. A drift that is then still in range stays constant."""
 
 STATE_BITS = 58
-"""Bits of a change per sample, without its sign: references ahead of time sum several of them."""
+"""Bits of a change per sample, excluding its sign: references ahead of time sum several such changes."""
 
 
 class FixedClockTable(Struct):
-    """Drift over time: its change in the first sample, and the growth of that from sample to sample."""
+    """Drift over time: its change in the first sample, and the growth of this change from sample to sample."""
 
     slope: Int64
     change: Int64
-    samples: Int64  # after which it stays constant
+    samples: Int64  # after which the drift stays constant
     farthest: Int64
     bits: UInt8  # bits of slope and change below those of a signal
 
 
 class FixedClockNumbers(FixedClockTable):
-    """The same with numbers that are not in the table in C."""
+    """The same with constants that are not in the table in C."""
 
     one: Int64
-    most_ahead: Int64  # samples by which references come ahead
+    most_ahead: Int64  # samples by which references are ahead at most
 
 
 class FixedClockState(Struct):
@@ -48,7 +48,7 @@ class FixedClockState(Struct):
     whole: Int64  # drift, in units of signals,
     part: Int64  # and the fraction below, in units of the table
     lead: Int64  # samples by which the next reference is ahead
-    gained: Int64  # growth of the change in a sample since the start
+    gained: Int64  # growth of the change per sample since the start
     count: Int64  # samples since the start
 
 
@@ -66,8 +66,8 @@ class ClockFormats:
 def numbers(
     effect: LinearDrift | CurvedDrift, step: float, signal: Fraction, farthest: float, ahead: int
 ) -> ClockFormats:
-    """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of `farthest`
-    signals either way. Raises OverflowError if the drift does not fit the numbers before it stays beyond that."""
+    """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of up to `farthest`
+    signals either way. Raises OverflowError if the drift overflows its numbers before it stays beyond `farthest`."""
     rate, change = (Fraction(x) for x in (effect.rate, getattr(effect, "change", 0.0)))
     own = Fraction(step)
     twice = change * own * own / signal
@@ -94,7 +94,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     """The number of samples after which the drift stays beyond `farthest`; at most `MOST_SAMPLES`."""
     if abs(_drift(slope, twice, float(MOST_SAMPLES))) <= farthest:
         return MOST_SAMPLES
-    low, high = max(math.ceil(-slope / twice) + 1, 0) if slope * twice < 0.0 else 0, MOST_SAMPLES  # from where it turns
+    low, high = max(math.ceil(-slope / twice) + 1, 0) if slope * twice < 0.0 else 0, MOST_SAMPLES  # after the turn
     while high - low > 1:
         middle = (low + high) // 2
         if _drift(slope, twice, float(middle)) * math.copysign(1.0, twice or slope) > farthest:
@@ -109,7 +109,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
 
 @jit
 def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # noqa: ARG001  block interface
-    """Start the clock at the drive absorbed last."""
+    """Start the clock at the last absorbed drive."""
     s.whole[j] = zero(s.whole[j])
     s.part[j] = s.whole[j]
     s.gained[j] = s.whole[j]
@@ -118,7 +118,7 @@ def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # no
 
 @jit
 def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: int, v: int) -> None:  # noqa: ARG001  block interface
-    """One sample later."""
+    """Advance by one sample."""
     if s.count[j] >= t.samples[j]:
         return
     part = s.part[j] + t.slope[j] + s.gained[j]
@@ -142,7 +142,7 @@ def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) ->
 
 
 def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockFormats:
-    """The clock of an effect, for references as far ahead as they may come."""
+    """The clock of an effect, for references as far ahead as they may be."""
     return numbers(effect, about.seconds, about.output_lsb / 2**about.bits, float(about.farthest), about.ahead)
 
 

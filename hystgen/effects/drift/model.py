@@ -31,7 +31,7 @@ class _Drift(Effect):
 
 
 class LinearDrift(_Drift):
-    """Straight drift `y + rate t` over session time, whatever the drive does; zero at t = 0."""
+    """Linear drift `y + rate t` over session time, whatever the drive does; zero at t = 0."""
 
     shape: Literal["linear"] = Field(default="linear", description="the same rate all the time")
 
@@ -52,7 +52,7 @@ class LinearDrift(_Drift):
 
 
 class CurvedDrift(_Drift):
-    """Drift whose rate changes, `y + rate t + change t^2/2`: a frame that warms up, a sensor that settles."""
+    """Drift at a changing rate, `y + rate t + change t^2/2`: a frame that warms up, a sensor that settles."""
 
     shape: Literal["curved"] = Field(description="a rate that changes evenly")
     change: Number = Field(description="of the rate, output units per s^2", examples=[1e-7])

@@ -9,7 +9,7 @@
 /* Bisection steps of the search for a lead, which end within 2^-16 of the interval. */
 #define HYSTGEN_BRAKED_HALVES 16u
 
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static hystgen_real_t hystgen_braked_rest(hystgen_braked_t *self, hystgen_real_t v) {
     self->earlier = v;
     return hystgen_lag_rest(&self->lag, v);
@@ -21,7 +21,7 @@ static hystgen_real_t hystgen_braked_solve(const hystgen_lag_table_t *t, hystgen
     return hystgen_lag_solve(t, &self->lag, y);
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 static hystgen_real_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystgen_braked_t *self,
                                             hystgen_real_t v) {
     self->earlier = self->lag.asked;

@@ -13,7 +13,7 @@
 /* Largest number in the search for a lead: the square of a sum of two fits 64 bits. */
 #define HYSTGEN_BRAKED_MOST (((int32_t)1 << 30) - 1)
 
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static int64_t hystgen_braked_rest(const hystgen_lag_table_t *t, hystgen_braked_t *self,
                                    int64_t v) {
     const int64_t output = hystgen_lag_rest(t, &self->lag, v);
@@ -27,7 +27,7 @@ static int64_t hystgen_braked_solve(const hystgen_lag_table_t *t, hystgen_braked
     return hystgen_lag_solve(t, &self->lag, y);
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 static int64_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystgen_braked_t *self,
                                      int64_t v) {
     self->earlier = self->lag.asked;

@@ -1,4 +1,4 @@
-"""A lag as a block: its exactly invertible part is inverted exactly, and the rest is of second order."""
+"""A lag as a block: its exactly invertible part is inverted exactly; the remainder is of second order."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Response
 from hystgen.plays.slots import Counts, zero
 
 LONG_STEP = 2.0
-"""[time constants in a step] From this step on the lag is inverted exactly. The pole of that inverse is then above
--0.53, so the response to one sample falls to 1 % in seven; its gain from reference to drive is 4.2, against 2.2 for the
-lead, and would be 13 with steps half as long. The lead leaves 0.3 % of a sine of 40 steps. Set by:
+"""[time constants per step] From this step length on the lag is inverted exactly. The inverse's pole is then above
+-0.53, so its response to one sample falls to 1 % in seven; its gain from reference to drive is 4.2, against 2.2 for the
+lead, and would be 13 with steps half as long. The lead leaves an error of 0.3 % on a sine of 40 steps. Set by:
 benchmarks/chosen_numbers.py lag."""
 
 
 MOST_LED = 2.0
-"""[times the move before] Largest move of a target that is led in full in front of two branches, so that a step is not
-led beyond its end, from which only a turn leads back. A step of 0.2 um out of a slow ramp overshoots by 0.002 um,
-without the limit by 0.1. The error on a sine of 100 samples from rest is 0.0032 um rms with 2 or more, 0.0045 with 1.
-Set by: benchmarks/chosen_numbers.py branches."""
+"""[times the previous move] Largest move of a target that is fully led in front of two branches, so that a step is not
+led beyond its end, from which the drive would have to turn back. A step of 0.2 um out of a slow ramp overshoots by
+0.002 um, without the limit by 0.1 um. The error on a sine of 100 samples from rest is 0.0032 um rms with 2 or more,
+0.0045 um with 1. Set by: benchmarks/chosen_numbers.py branches."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class LagNumbers(One):
 
     @property
     def room(self) -> float:
-        """The same gain, for intermediate results."""
+        """Largest gain up to its intermediate results."""
         return 2.0 / (self.late if self.exact else self.rate)
 
     @property
@@ -61,14 +61,14 @@ class LagNumbers(One):
         return not self.exact
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`; `led` has the inverse's."""
+        """Roundings of the output for inputs up to `size`; those of the inverse are in `led`."""
         return u * size * (8.0 + u / self.rate), 0.0
 
     def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
-        """The error of the input for an error of the output asked for.
+        """The error of the input for an error of the requested output.
 
-        States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
-        targets, `W = theta^2 e + theta (1 - theta) W`.
+        States that have seen the same drives pass on `goal/rate`, and the error of the previous target, which follows
+        from earlier targets, `W = theta^2 e + theta (1 - theta) W`.
         """
         rate, theta = self.rate, self.second
         if self.exact:
@@ -89,20 +89,20 @@ class LagNumbers(One):
 
     @property
     def fineness(self) -> float:
-        """Bits of a signal in front of the plays that its lead costs, 0 for none."""
+        """Bits of accuracy that its lead costs a signal in front of the plays, 0 for none."""
         return 0.0 if self.exact else math.log2(4.0 / self.rate)
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
+        """Largest answer of the inverse for outputs up to `asked`, after inputs up to `given`."""
         return self.sizes(given, asked, margin.turning).answer
 
     def sizes(self, given: float, asked: float, turning: bool) -> LagSizes:
-        """Sizes of its signals."""
+        """Largest sizes of its signals."""
         return LagSizes(self.exact, self.rate, self.late, given, asked, turning)
 
 
 class LagSizes:
-    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
+    """Largest sizes of a lag's signals: its input, the output asked of it, its states, and the inverse's answer;
     `turning`: in front of two branches."""
 
     def __init__(
@@ -114,7 +114,7 @@ class LagSizes:
             self.answer = given + self.state / late
         else:
             # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2; or with two branches
-            # asked and a move that is led, 2 asked, less what the input was short of, (1 - theta)(2 asked + 3 given)
+            # asked plus a led move, 2 asked, minus the shortfall of the input, (1 - theta)(2 asked + 3 given)
             self.state = 3.0 * (given + (2.0 if turning else 1.0) * asked)
             self.answer = given + self.state / rate
 
@@ -122,12 +122,12 @@ class LagSizes:
 def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None) -> LagNumbers:
     """The constants of a lag at steps of `seconds`.
 
-    `turning`: blocks behind the lag depend on its direction of arrival, so it is always led; `exact`: overrides this.
+    `turning`: blocks behind the lag depend on its direction of arrival, so it is always led; `exact` overrides this.
 
     For steps T well below tau, the inverse of `a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k` has a pole near -1 and rings.
     With `theta = b0/(1 - E)` and `x_k = E x_(k-1) + (1 - E) v_k`, which is exactly invertible, `a_k = (1 - theta) x_k +
-    theta x_(k-1)` for even steps: x is led to `a + theta (a - a_before)`. What remains is `theta^2` times the second
-    difference of the wanted a. For T >= 2 tau the pole fades within a few samples, and the exact inverse is used.
+    theta x_(k-1)` for even steps: x is led to `a + theta (a - a_before)`. The error is `theta^2` times the second
+    difference of the target a. For T >= 2 tau the exact inverse decays within a few samples, and is used.
     """
     if exact is None:
         exact = seconds >= LONG_STEP * effect.time_constant and not turning
@@ -139,11 +139,11 @@ def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | No
 
 
 def shifted(theta: float, turning: bool = False) -> float:
-    """Largest error of a lag's goal, for errors up to 1 of the output asked for, if it has seen the same drives.
+    """Largest error of a lag's goal, for errors up to 1 of the requested output, if the lag has seen the same drives.
 
-    The previous target follows from the drive that led to it: it keeps `W = theta^2 + theta (1 - theta) W` of earlier
-    errors. In front of two branches (`turning`) the led move is off by the errors of two targets, or `MOST_LED` times
-    those.
+    The previous target follows from the drive that led to it and retains earlier errors, `W = theta^2 + theta (1 -
+    theta) W`. In front of two branches (`turning`) the led move is off by the errors of two targets, or `MOST_LED`
+    times those errors.
     """
     if turning:
         return 1.0 + 2.0 * MOST_LED * theta
@@ -153,8 +153,8 @@ def shifted(theta: float, turning: bool = False) -> float:
 # ---------------------------------------------------------------- lag.c, lag_exact.c
 
 HALVES = 16
-"""[steps] Halvings of the search for a lead. They end at most 2^-16 of the lead below it, which costs less than 2e-5 of
-the way and never overshoots; the tests of overshoot check that."""
+"""[steps] Halvings of the search for a lead. The lead found is at most 2^-16 of the lead too small, which costs less
+than 2e-5 of the distance and never overshoots, as the tests of overshoot check."""
 
 
 class LagTable(Struct):
@@ -178,17 +178,17 @@ class ExactTable(Struct):
 class LagState(Struct):
     """A lag that is led."""
 
-    high: Real  # x, a lag on a drive that holds, in two parts
+    high: Real  # x, the response to a held drive, in two parts
     low: Real
-    wanted: Real  # output that the last input leads to
-    asked: Real  # output asked for,
+    wanted: Real  # output to which the last input leads
+    asked: Real  # requested output,
     answer: Real  # and the input that was to lead there
 
 
 class BrakedState(LagState):
     """A lag behind a slew limit."""
 
-    earlier: Real  # asked for a sample before
+    earlier: Real  # `asked` one sample earlier
 
 
 class ExactState(Struct):
@@ -204,8 +204,8 @@ EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState)
 
 
 class LagTables(NamedTuple):
-    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; its numbers are then in `inverted` (k,), else
-    in `led` (k,); `braked`: 1 if the only one is kept from overshooting behind a slew limit."""
+    """All lags of a model: `exact` (k,), 1 for a lag that is inverted exactly, with its constants in `inverted` (k,),
+    else in `led` (k,); `braked`: 1 if the only lag is kept from overshooting behind a slew limit."""
 
     exact: Counts
     led: LagTable
@@ -214,7 +214,7 @@ class LagTables(NamedTuple):
 
 
 class LagMemory(NamedTuple):
-    """Memory of all lags: of each as one that is led, and as one that is inverted exactly."""
+    """Memory of all lags: of each lag as a led lag, and as a lag that is inverted exactly."""
 
     led: BrakedState
     inverted: ExactState
@@ -230,7 +230,7 @@ def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray
 
 
 def constants(t: LagTables) -> Iterator[Constants]:
-    """The numbers of each lag."""
+    """The constants of each lag."""
     kind = BRAKED_KIND if t.braked else KIND
     for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
         yield Constants(EXACT_KIND, inverted, (3, 3)) if exact else Constants(kind, led, (3, 2))
@@ -238,7 +238,7 @@ def constants(t: LagTables) -> Iterator[Constants]:
 
 @jit
 def lag_rest(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     if t.exact[j]:
         s.inverted.reached[j] = x
         s.inverted.before[j] = x
@@ -267,7 +267,7 @@ def lag_solve(t: LagTables, s: LagMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     if t.exact[j]:
         reached = s.inverted.reached[j]
         given = t.inverted.early[j] * s.inverted.before[j] + t.inverted.late[j] * x
@@ -295,7 +295,7 @@ def steady_missed(t: LagTables, way: Scalar) -> Scalar:
 
 @jit
 def steady_led(way: N, moved: N) -> N:
-    """The led part of a target's move, at most `MOST_LED` times the move before."""
+    """The led part of a target's move, at most `MOST_LED` times the previous move."""
     most = moved + moved
     least = most - most
     if most < 0:
@@ -308,8 +308,8 @@ def steady_solve(
     t: LagTables, s: LagMemory, y: Scalar, moved: Scalar, rises: int, applied: Scalar, little: Scalar
 ) -> tuple[Scalar, Scalar]:
     """The input that leads a model's only lag to the output y without turning it back from the direction `rises`, and
-    the move to y from the output asked for before, to which it had `moved`. A brake sees only the led part of the move,
-    and the previous input's shortfall."""
+    the move to y from the previously requested output, `moved` being the move before. A brake sees only the led part of
+    the move, and the previous input's shortfall."""
     way = y - s.led.asked[0]
     missed = s.led.earlier[0] - s.led.wanted[0]
     s.led.wanted[0] = y - steady_led(way, moved)
@@ -322,8 +322,8 @@ def steady_solve(
 
 @jit
 def steady_kept(t: LagTables, s: LagMemory, v: Scalar, rises: int, applied: Scalar, little: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
-    """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else one with which x comes to
-    rest without going back: the last one, `applied`, or one ahead of x by `little`."""
+    """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else an input with which x comes
+    to rest without going back: the last input, `applied`, or the input ahead of x by `little`."""
     x = s.led.high[0]
     ahead, kept = (v - x, applied - x) if rises else (x - v, x - applied)
     if ahead >= little:
@@ -335,8 +335,8 @@ def steady_kept(t: LagTables, s: LagMemory, v: Scalar, rises: int, applied: Scal
 
 @jit
 def steady_absorb(s: LagMemory, before: Scalar) -> None:
-    """The lag has followed from x = `before`. The rounding error of a sum is known exactly unless x has moved by more
-    than its own size; it could then take x back, and is dropped."""
+    """Note that the lag has moved from x = `before`. The rounding error of a sum is known exactly unless x has moved by
+    more than its own size; it could then take x back, and is dropped."""
     x = s.led.high[0]
     way = x - before
     if (-way if way < 0 else way) >= (-before if before < 0 else before):
@@ -351,13 +351,13 @@ def braked(
     t: LagTables, s: LagMemory, near: Scalar, short: Scalar, falling: Scalar, rising: Scalar, halves: int
 ) -> Scalar:
     """The drive at which a model's only lag does not overshoot, although the drive comes back by at most `falling` or
-    `rising` a step.
+    `rising` per step.
 
-    `near`: the reachable drive nearest to the answer, `short` of it. A target that moves on by `way` a step takes a
-    lead of `way/(1 - E)`. With a lead m beyond that, which shrinks by `back` a step, the lag gains at most `(1 - E)(m +
-    back/2)^2/(2 back)` on the target; it has to gain `left`. Up to `left = (1 - E) back/2` it arrives in one step, and
-    a drive no farther than the lag's destination never overshoots. A lead that nothing limits is right as it is: the
-    drive gives way by at most its shortfalls from the answer, now and before. `halves`: of the search for m.
+    `near`: the reachable drive nearest to the answer, `short` of it. A target that moves on by `way` per step takes a
+    lead of `way/(1 - E)`. With a lead m beyond that, which shrinks by `back` per step, the lag gains at most `(1 - E)(m
+    + back/2)^2/(2 back)` on the target; it has to gain `left`. Up to `left = (1 - E) back/2` it arrives in one step,
+    and a drive no farther than the lag's destination never overshoots. A lead that no limit affects is already right:
+    the drive is reduced by at most its present and previous shortfall from the answer. `halves`: of the search for m.
     """
     missed = s.led.earlier[0] - s.led.wanted[0]
     room = short + (-missed if missed < 0 else missed) * t.led.inverse_rate[0]
@@ -383,7 +383,7 @@ def braked(
 def braked_over(
     size: Scalar, most: Scalar, lead: Scalar, back: Scalar, room: Scalar, half: Scalar, halves: int
 ) -> Scalar:
-    """Excess of a lead over the largest one that comes back in time, within `room`; `most` gains `size` at once."""
+    """Excess of a lead over the largest lead that comes back in time, at most `room`; `most` gains `size` at once."""
     margin = back * half
     over = lead - most
     if most > margin:
@@ -419,12 +419,12 @@ ARITHMETIC = Realized(
 
 
 ALL_HALVES = 64
-"""[steps] Halvings that exhaust double precision, which has 53 bits."""
+"""[steps] Halvings that exhaust the 53 bits of double precision."""
 
 
 class UnevenLag(Block):
     """A lag in double precision at steps of any length: the first of two rows leads it, the second inverts it exactly
-    and gives its output. With `always_led` it is led since a rounded drive does not arrive exactly."""
+    and gives its output. With `always_led` it is led, since a rounded drive does not arrive exactly."""
 
     def __init__(self, effect: Lag) -> None:
         self.rises: Callable[[], bool] | None = None
@@ -436,13 +436,13 @@ class UnevenLag(Block):
         self.begun = self.state.led[0].copy()
 
     def advance(self, seconds: float, later: float | None = None) -> None:
-        """The numbers of this step."""
+        """Set the constants for this step."""
         long, self.table = self._of_step(seconds)
         self.exact = long and not self.always_led
 
     @property
     def patience(self) -> float:
-        """The share of the way to the other branch that it falls short in the first sample of a turn."""
+        """The share of the distance to the other branch by which it falls short in the first sample of a turn."""
         return 0.0 if self.exact else float(self.table.led.theta[0])
 
     def call(self, verb: str, x: float) -> float:
@@ -476,12 +476,12 @@ class UnevenLag(Block):
         return float(steady_kept(self.table, self.state, v, int(self.rises()), self.state.led.high[0], 0.0))
 
     def braked(self, near: float, short: float, falling: float, rising: float) -> float:
-        """The drive at which it does not overshoot, by `braked`."""
+        """The drive at which the lag does not overshoot, from `braked`."""
         return self.steady(float(braked(self.table, self.state, near, short, falling, rising, ALL_HALVES)))
 
 
 def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
-    """Whether a step is long enough for the exact inverse, and the numbers of both."""
+    """Whether a step is long enough for the exact inverse, and the constants for both cases."""
     long = numbers(effect, seconds).exact
     return long, tables([numbers(effect, seconds, exact=exact) for exact in (False, True)], lambda x, _: np.array(x))
 

@@ -7,7 +7,7 @@
 #endif
 
 #ifdef HYSTGEN_FIXED
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static int64_t hystgen_lag_exact_rest(const hystgen_lag_exact_table_t *t, hystgen_lag_exact_t *self,
                                       int64_t v) {
     self->next = v * ((int64_t)1 << t->bits);
@@ -22,7 +22,7 @@ static int64_t hystgen_lag_exact_solve(const hystgen_lag_exact_table_t *t,
     return self->before + hystgen_times(more >> t->drop, &t->inverse_late);
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 HYSTGEN_APART int64_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *t,
                                                hystgen_lag_exact_t *self, int64_t v) {
     const int64_t reached = self->next + hystgen_times(v - self->before, &t->late);
@@ -32,7 +32,7 @@ HYSTGEN_APART int64_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *
     return hystgen_nearest(reached, t->bits);
 }
 #else
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static hystgen_real_t hystgen_lag_exact_rest(hystgen_lag_exact_t *self, hystgen_real_t v) {
     self->reached = v;
     self->before = v;
@@ -47,7 +47,7 @@ static hystgen_real_t hystgen_lag_exact_solve(const hystgen_lag_exact_table_t *t
     return (y - ahead) * t->inverse_late;
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 static hystgen_real_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *t,
                                                hystgen_lag_exact_t *self, hystgen_real_t v) {
     const hystgen_real_t reached = self->reached;

@@ -1,7 +1,7 @@
 """A lag as a block in fixed point: the same split as in floating point, with states that have bits below a signal's.
 
 Instead of the input solved for, which can be as large as the lead, the state keeps the lag's intended move `lead`; with
-another input, the target falls short by `1 - theta` of the difference of the two moves.
+another input, the target falls short by `1 - theta` times the difference between the two moves.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Counts, zero
 
 EXACT_BITS = 8
-"""Bits of the state of a lag that is inverted exactly, which no rounding can stall."""
+"""Bits of the state of a lag that is inverted exactly, which rounding cannot stall."""
 
 
 class FixedLagTable(Struct):
@@ -52,16 +52,16 @@ class FixedExactTable(Struct):
 class FixedLagState(Struct):
     """A lag that is led."""
 
-    high: Int64  # x, a lag on a drive that holds
-    wanted: Int64  # output that the last input leads to
-    asked: Int64  # output asked for,
+    high: Int64  # x, the response to a held drive
+    wanted: Int64  # output to which the last input leads
+    asked: Int64  # requested output,
     lead: Int64  # and the move that is to lead there
 
 
 class FixedBrakedState(FixedLagState):
     """A lag behind a slew limit."""
 
-    earlier: Int64  # asked for a sample before
+    earlier: Int64  # `asked` one sample earlier
 
 
 class FixedExactState(Struct):
@@ -93,7 +93,7 @@ class FixedLagMemory(NamedTuple):
 
 
 def constants(t: FixedLagTables) -> Iterator[Constants]:
-    """The numbers of each lag."""
+    """The constants of each lag."""
     kind = BRAKED_KIND if t.braked else KIND
     for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
         yield Constants(EXACT_KIND, inverted, (8, 4)) if exact else Constants(kind, led, (8, 4))
@@ -110,7 +110,7 @@ class LagFormats(Coded):
 
     @cached_property
     def _roundings(self) -> tuple[float, float, float]:
-        """Of the output, of the state in the inverse, and of the answer, in units of signals."""
+        """Roundings of the output, of the state in the inverse, and of the answer, in units of signals."""
         exact, rate, second, late = self.one.exact, self.one.rate, self.one.second, self.one.late
         state, scale, given = 2.0**-self.bits, 2.0**self.drop, self.sizes.given
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
@@ -129,11 +129,11 @@ class LagFormats(Coded):
 
     @property
     def follows(self) -> float:
-        """Change of the output for a change of the input in one sample, as a share."""
+        """Share of a change of the input that reaches the output in the same sample."""
         return 1.0 if self.one.exact else self.one.rate * (1.0 + 2.0 * self.one.second)
 
     def led(self, error: float, code: float, same: bool, turning: bool) -> float:
-        """Error of the input for an error of the output asked for; `code`: rounding of the input."""
+        """Error of the input for an error of the requested output; `code`: rounding of the input."""
         rate, second, late = self.one.rate, self.one.second, self.one.late
         _, kept, answer = self._roundings
         if not self.one.exact:  # its states have seen the same drives
@@ -145,7 +145,7 @@ class LagFormats(Coded):
 
 
 def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: float) -> LagFormats:
-    """A lag for signals up to these sizes. Raises OverflowError where states have no room."""
+    """A lag for signals up to these sizes. Raises OverflowError if the states do not fit."""
     sizes = one.sizes(given, asked, about.margin.turning)
     room = STATE_BITS - math.ceil(math.log2(sizes.state))
     wanted = EXACT_BITS if one.exact else max(math.ceil(-math.log2(one.rate)), 0) + GUARD
@@ -170,18 +170,18 @@ def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTa
 # ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
 
 COARSE = 2**30 - 1
-"""Largest number in the search for a lead, so that the square of a sum of two fits 64 bits."""
+"""Largest number in the search for a lead, so that the square of a sum of two such numbers fits in 64 bits."""
 
 
 @jit
 def scaled(t: FixedLagTable | FixedExactTable, j: int, x: int, by: Factor) -> int:
-    """A number of a state's units times a factor of lag j."""
+    """A number in a state's units times a factor of lag j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
 def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     if t.exact[j]:
         s.inverted.next[j] = x << t.inverted.bits[j]
         s.inverted.before[j] = x
@@ -209,7 +209,7 @@ def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
 
 @jit
 def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     if t.exact[j]:
         late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
         reached = s.inverted.next[j] + late
@@ -240,7 +240,7 @@ def steady_missed(t: FixedLagTables, way: int) -> int:
 def steady_solve(
     t: FixedLagTables, s: FixedLagMemory, y: int, moved: int, rises: int, applied: int, little: int
 ) -> tuple[int, int]:
-    """As in floating point; an input that is kept has no move."""
+    """As in floating point; a kept input has no move."""
     bits = t.led.bits[0]
     way = y - (s.led.asked[0] >> bits)
     missed = s.led.earlier[0] - s.led.wanted[0]
@@ -271,7 +271,7 @@ def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: int, rises: int, applie
 
 @jit
 def steady_absorb(s: FixedLagMemory, before: int) -> None:
-    """The lag has followed; rounding loses nothing that could take it back."""
+    """Note that the lag has moved; sums are exact, so no remainder can take it back."""
 
 
 # ---------------------------------------------------------------- braked_fixed.c

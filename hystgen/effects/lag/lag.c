@@ -7,7 +7,7 @@
 #define HYSTGEN_LAG_LAG_C
 #include "compensator/chain/model.h"
 
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v) {
     self->high = v;
     self->low = 0;
@@ -26,7 +26,7 @@ static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_la
     return self->answer;
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
                                          hystgen_real_t v) {
     const hystgen_real_t high = self->high;

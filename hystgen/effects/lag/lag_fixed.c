@@ -14,7 +14,7 @@ static int64_t hystgen_lag_scaled(const hystgen_lag_table_t *t, int64_t x,
     return hystgen_times(x >> t->drop, f);
 }
 
-/* Everything has settled at the input v. Returns the output. */
+/* Settles everything at the input v. Returns the output. */
 static int64_t hystgen_lag_rest(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v) {
     self->high = v * ((int64_t)1 << t->bits);
     self->wanted = self->high;
@@ -32,7 +32,7 @@ static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *se
            hystgen_lag_scaled(t, self->lead, &t->inverse_rate);
 }
 
-/* The input is v at this sample. Returns the output. */
+/* Takes the input v at this sample. Returns the output. */
 HYSTGEN_APART int64_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
                                          int64_t v) {
     const int64_t given = v * ((int64_t)1 << t->bits);

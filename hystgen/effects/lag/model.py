@@ -1,4 +1,4 @@
-"""First-order lag of amplifier or averaging in front of the actuator."""
+"""First-order lag of an amplifier or of averaging in front of the actuator."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 class Lag(Effect):
     """First-order lag `tau a' + a = v` of the drive.
 
-    For a `v` that is straight over a step the solution is exact (first-order hold: Franklin, Powell, Workman, Digital
-    Control of Dynamic Systems). A record starts settled at its first drive.
+    For `v` linear over a step the solution is exact (first-order hold: Franklin, Powell, Workman, Digital Control of
+    Dynamic Systems). A record starts settled at its first drive.
     """
 
     name: Literal["lag"] = Field(description="name of the effect")

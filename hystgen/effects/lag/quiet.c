@@ -1,15 +1,15 @@
 /* A drive that stands still while the reference does. Each drive into a lag corrects the rounding
    of the previous drive, and creep responds to this too: at rest the drive alternates by a code.
    After HYSTGEN_QUIET equal references, with drives no farther than HYSTGEN_DITHER from the drive
-   needed at rest, the last drive is kept until it is farther off. The requested output of the drive
-   side is then within twice HYSTGEN_DITHER of the present one; a larger difference is a jump.
+   needed at rest, the last drive is kept until it is farther away. The requested output of the
+   drive side is then within twice HYSTGEN_DITHER of the present one; a larger difference is a jump.
    Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_QUIET_C
 #define HYSTGEN_LAG_QUIET_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/drive_signal.c"
 
-/* Everything has settled at the output a of the drive side. */
+/* Starts at rest with the output a of the drive side. */
 static void hystgen_quiet_rest(hystgen_quiet_t *self, hystgen_signal_t a) {
     self->arrived = a;
     self->reference = 0;

@@ -1,6 +1,6 @@
-/* A lag before a memoryless part of two branches, which has to arrive from the side of its branch:
-   x moves in one direction while drives lie ahead, and so does the output, between two values of x.
-   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* A lag before a memoryless part with two branches has to arrive from the side of its branch: x and
+   the output, between two values of x, move in one direction while drives lie ahead of x. Called by
+   the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_C
 #define HYSTGEN_LAG_STEADY_C
 #include "compensator/chain/model.h"

@@ -1,6 +1,6 @@
-/* A lag before a memoryless part of two branches in fixed point, as in floating point. `little` is
-   at least a drive code, so that a drive is still ahead of x after rounding to a code. Called by
-   the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* A lag before a memoryless part with two branches, as in floating point. `little` is at least a
+   drive code, so that a drive is still ahead of x after rounding to a code. Called by the functions
+   that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_FIXED_C
 #define HYSTGEN_LAG_STEADY_FIXED_C
 #include "arithmetic/fixed.h"

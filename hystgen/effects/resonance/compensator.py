@@ -1,8 +1,8 @@
 """A mode as a block of the forward operator.
 
-The block keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, so that rounding ends
-with the motion. Only the forward operator has it: the zeros of a second-order system sampled with straight input, near
--0.27 and -3.7, cannot be inverted.
+The block keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, so that rounding errors
+end with the motion. Only the forward operator has it: a second-order system sampled with linear input has zeros near
+-0.27 and -3.7, so its inverse is unstable.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**20
-"""Samples of a free oscillation that are summed one by one; the rest has one bound."""
+"""Samples of a free oscillation that are summed one by one; the remainder has a common bound."""
 
 FADED = 45.0
 """Time constants after which an oscillation is below the last bit of a double."""
@@ -30,10 +30,10 @@ FADED = 45.0
 
 @dataclass(frozen=True)
 class ModeNumbers(One):
-    """A mode at one step length, and its responses summed in size over all samples.
+    """A mode at one step length, and the sums of its absolute responses over all samples.
 
-    `table` (5,): the changes of `off` and `rate` by themselves in a step, their coupling, and their responses to a
-    change of the input; `largest` and `fastest`: output and rate for inputs within 1; `off_after`, `rate_after`: summed
+    `table` (5,): changes of `off` and `rate` per step due to themselves, their coupling, and their responses to a
+    change of the input; `largest` and `fastest`: output and rate for inputs up to 1; `off_after`, `rate_after`: summed
     response of the output to a disturbance of `off`, and of `rate`; `turned`, `slowed`: the same for the rate.
     """
 
@@ -47,11 +47,11 @@ class ModeNumbers(One):
 
     @property
     def growth(self) -> float:
-        """Largest output for inputs within 1."""
+        """Largest output for inputs of magnitude at most 1."""
         return self.largest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
+        """Roundings of the output in floating point with unit roundoff `u`, for inputs up to `size`."""
         keep, turn, swing, lead, push = map(abs, self.table)
         off, rate = (1.0 + self.largest) * size, self.fastest * size
         steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
@@ -59,12 +59,12 @@ class ModeNumbers(One):
         return lost[0] * self.off_after + lost[1] * self.rate_after + u * self.largest * size, 0.0
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size * self.largest * margin.slack + 1.0
 
 
 def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
-    """The numbers at steps of `seconds`, from responses in closed form, summed until they have faded."""
+    """The constants at steps of `seconds`, from responses in closed form, summed until they have decayed."""
     zeta, angle = effect.damping, 2.0 * math.pi * effect.frequency * seconds
     slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
     count = int(min(math.ceil(FADED / (slow * angle)) + 2, MOST_SAMPLES))
@@ -72,7 +72,7 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
     _, _, lead, push = (float(x[0]) for x in effect.forced(np.array([seconds])))
     lead -= 1.0
     c, s = float(cosine[1]), float(sine[1])
-    # |sine| <= k angle q^k and |cosine| <= (1 + k angle) q^k, beyond the samples that are summed
+    # |sine| <= k angle q^k and |cosine| <= (1 + k angle) q^k, after the samples that are summed
     lost = -math.expm1(-slow * angle)
     left = math.exp(-slow * angle * count) / lost
     tail = left * (1.0 + (1.0 + zeta) * angle * (count + 1.0 / lost))
@@ -94,8 +94,8 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
 
 
 class ModeTable(Struct):
-    """In a step a mode's two states, output less input and the rate of that, change by shares of themselves (keep,
-    swing), of each other (turn), and of a change of the input (lead, push)."""
+    """In a step, a mode's two states, output minus input and the rate of this difference, change by shares of
+    themselves (keep, swing), of each other (turn), and of a change of the input (lead, push)."""
 
     keep: Real
     turn: Real
@@ -108,7 +108,7 @@ class ModeState(Struct):
     """A mode."""
 
     before: Signal  # input of the last sample
-    off: Signal  # output less input
+    off: Signal  # output minus input
     rate: Signal  # of `off`, per radian of the mode
 
 
@@ -123,7 +123,7 @@ def tables(modes: Sequence[ModeNumbers], about: FloatSurroundings) -> ModeTable:
 
 @jit
 def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     s.before[j] = x
     s.off[j] = zero(x)
     s.rate[j] = zero(x)
@@ -132,7 +132,7 @@ def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa:
 
 @jit
 def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]
@@ -150,6 +150,6 @@ PART = ChainPart(
     ARITHMETIC, late("resonance"), forward=True,
     code=("mode",),
 )
-"""A mode as a part of the chain, of the forward operator alone."""
+"""A mode as a part of the chain, in the forward operator only."""
 
 PARTS = (PART,)

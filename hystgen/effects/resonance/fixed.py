@@ -1,7 +1,7 @@
 """A mode as a block of the forward operator in fixed point, with states that have bits below a signal's.
 
-A change of the input enters `off` in full, less the part that the output follows in the same step: for a mode far below
-the sample rate that is a small factor, with 31 bits of its own.
+A change of the input enters `off` in full, minus the part that the output follows in the same step: for a mode far
+below the sample rate this part is a small factor, with 31 bits of its own.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Row = tuple[tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], 
 
 
 class FixedModeTable(Struct):
-    """As in floating point; a change of the input adds `late` of it, less the change itself, and `push`."""
+    """As in floating point; a change of the input adds `late` times the change minus the change itself, and `push`."""
 
     keep: Factor
     turn: Factor
@@ -32,8 +32,8 @@ class FixedModeTable(Struct):
     late: Factor
     push: Factor
     bits: UInt8  # bits of the states below those of a signal,
-    drop: UInt8  # bits that products with states leave out,
-    lift: UInt8  # and bits that products with a change of the input leave out
+    drop: UInt8  # bits that products with states drop,
+    lift: UInt8  # and bits that products with a change of the input drop
 
 
 KIND = replace(compensator.KIND, table=FixedModeTable)
@@ -45,7 +45,7 @@ def largest_state(one: ModeNumbers, size: float) -> float:
 
 
 def row(one: ModeNumbers, size: float) -> Row:
-    """The numbers of a mode whose inputs are signals up to `size`. Raises OverflowError where states have no room."""
+    """The table of a mode whose inputs are signals up to `size`. Raises OverflowError if the states do not fit."""
     state = max(largest_state(one, size), 1.0)
     wanted = math.ceil(math.log2(max(one.off_after + one.rate_after, 1.0))) + GUARD
     bits = min(wanted, STATE_BITS - 2 - math.ceil(math.log2(state)))
@@ -61,13 +61,13 @@ def row(one: ModeNumbers, size: float) -> Row:
 
 
 def rounding(one: ModeNumbers, table: Row, size: float) -> float:
-    """Roundings of the output in signals, for inputs up to `size` of them."""
+    """Roundings of the output, in signals, for inputs up to `size` signals."""
     *_, bits, drop, lift = table
     state, most = 2.0**-bits, largest_state(one, size)
     keep, turn, swing, lead, push = one.table
 
     def products(own: float, enters: float) -> float:
-        """Roundings of a step's change of a state: two products with states, and one with a change of the input."""
+        """Roundings of a state's change in a step: two products with states, and one with a change of the input."""
         found = state * (1.0 + 2.0**drop * (abs(own) + abs(turn)) + 0.5 * 2.0**lift)
         found += most * sum(missed(x * 2.0**drop) * 2.0**-drop for x in (own, turn))
         scale = 2.0 ** (bits - lift)
@@ -79,13 +79,13 @@ def rounding(one: ModeNumbers, table: Row, size: float) -> float:
 
 @dataclass(frozen=True)
 class ModeFormats(Coded):
-    """A mode by its numbers."""
+    """A mode, given by its constants."""
 
     one: ModeNumbers
     row: Row
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs within a size, with signals of this unit."""
+        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
         return rounding(self.one, self.row, size / signal) * signal
 
 
@@ -97,7 +97,7 @@ mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 @jit
 def scaled(t: FixedModeTable, j: int, x: int, by: Factor) -> int:
-    """A number of a state's units times a factor of mode j."""
+    """A number in a state's units times a factor of mode j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
@@ -109,7 +109,7 @@ def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
 
 @jit
 def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]

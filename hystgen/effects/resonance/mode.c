@@ -19,7 +19,7 @@ HYSTGEN_APART int64_t hystgen_mode_entered(const hystgen_mode_table_t *t, int64_
     return hystgen_times(change, f) * ((int64_t)1 << t->lift);
 }
 
-/* Everything has settled at the input x. Returns the output. */
+/* Settles everything at the input x. Returns the output. */
 static int64_t hystgen_mode_rest(hystgen_mode_t *self, int64_t x) {
     self->before = x;
     self->off = 0;
@@ -27,7 +27,7 @@ static int64_t hystgen_mode_rest(hystgen_mode_t *self, int64_t x) {
     return x;
 }
 
-/* The input is x at this sample. Returns the output. */
+/* Takes the input x at this sample. Returns the output. */
 HYSTGEN_APART int64_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen_mode_t *self,
                                           int64_t x) {
     const int64_t change = x - self->before;
@@ -42,7 +42,7 @@ HYSTGEN_APART int64_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen
     return self->before + hystgen_nearest(self->off, t->bits);
 }
 #else
-/* Everything has settled at the input x. Returns the output. */
+/* Settles everything at the input x. Returns the output. */
 static hystgen_real_t hystgen_mode_rest(hystgen_mode_t *self, hystgen_real_t x) {
     self->before = x;
     self->off = 0;
@@ -50,7 +50,7 @@ static hystgen_real_t hystgen_mode_rest(hystgen_mode_t *self, hystgen_real_t x) 
     return x;
 }
 
-/* The input is x at this sample. Returns the output. */
+/* Takes the input x at this sample. Returns the output. */
 static hystgen_real_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen_mode_t *self,
                                           hystgen_real_t x) {
     const hystgen_real_t change = x - self->before;

@@ -20,7 +20,7 @@ from hystgen.effects.resonance.part import BLOCK
 def rung(
     y: float, rate: float, u: float, after: float, c: float, s: float, ramp: float, step: float, damping: float
 ) -> tuple[float, float]:
-    """Output and rate of `ring` after a step in which its input goes from `u` to `after`."""
+    """Output and rate of `ring` after a step in which the input goes from `u` to `after`."""
     off = y - u
     change = after - u
     return (
@@ -31,12 +31,12 @@ def rung(
 
 @jit
 def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
-    """Second-order low pass of every row of `u` (R, N), from rest, over steps with straight `u`.
+    """Second-order low pass of every row of `u` (R, N), from rest, over steps with linear `u`.
 
     `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: increments of the output and its rate for a change
     of `u` by 1 over the step. Rates are per radian of the undamped oscillation.
     """
-    # Four in parallel, since each alone waits for its own previous sample
+    # Four in parallel: a single recursion would stall on its previous sample
     rows, number = u.shape
     fours = rows // 4 * 4
     for i in range(0, fours, 4):
@@ -61,7 +61,7 @@ def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float,
 class _Mode(Effect):
     """`m'' + 2 zeta w0 m' + w0^2 m = w0^2 h`, `w0 = 2 pi frequency`, gain 1 at rest; several in series.
 
-    For straight `h` over a step the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`. A
+    For `h` linear over a step the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`. A
     record starts at rest: `m = h`, `m' = 0`.
     """
 
@@ -76,7 +76,7 @@ class _Mode(Effect):
     repeatable: ClassVar[bool] = True
 
     def time_scale(self, drive_range: float) -> float:
-        """The time in which a free oscillation decays by e."""
+        """The time in which a free oscillation decays by a factor of e."""
         zeta = self.damping
         slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
         return 1.0 / (2.0 * math.pi * self.frequency * slow)
@@ -102,7 +102,7 @@ class _Mode(Effect):
         with np.errstate(divide="ignore", invalid="ignore"):
             ramp = 1.0 + (2.0 * zeta * (c - 1.0) + (2.0 * zeta * zeta - 1.0) * s) / x
             step = (1.0 - c - zeta * s) / x
-        # These digits cancel for short steps
+        # Avoids cancellation for short steps
         curved = (4.0 * zeta * zeta - 1.0) * x * x
         short = x < 1e-3 / (1.0 + zeta)
         ramp = np.where(short, x * x * (1.0 / 6.0 - zeta * x / 12.0 + curved / 120.0), ramp)
@@ -110,7 +110,7 @@ class _Mode(Effect):
         return np.stack([c, s, ramp, step])
 
     def denominator(self, step: float) -> tuple[float, float]:
-        """`a1`, `a2` of the exact poles over a step, `z^2 + a1 z + a2`."""
+        """`a1`, `a2` of the exact poles at steps of this length, `z^2 + a1 z + a2`."""
         zeta, angle = self.damping, 2.0 * math.pi * self.frequency * step
         if zeta < 1.0:
             decay = math.exp(-zeta * angle)
@@ -134,9 +134,9 @@ class _Mode(Effect):
 
 
 WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
-`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
-and grows without bound towards 1. Both are closed forms; no run set it."""
+"""[damping ratio] At this damping and above, a mode is inverted rather than shaped or notched. It overshoots a step by
+`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits is 1.4 times the undamped half
+period and grows without bound towards 1. Derived from these closed forms, not from a run."""
 
 
 class Resonance(_Mode):
@@ -150,20 +150,20 @@ class Resonance(_Mode):
     compensation: ClassVar[str] = "samples of the reference on either side of the present one: no ringing, no delay"
 
     def rings(self, by: str) -> bool:
-        """Whether it is compensated by a shaper or a notch, as `by` says."""
+        """Whether it rings and `by` asks for a shaper or a notch."""
         return by in ("shaper", "notch") and self.damping < WELL_DAMPED
 
     def corrected(self, resonance: str) -> str:
         """By its inverse, a shaper or a notch, or not at all."""
         if resonance == "none":
-            return "none, as emit.compensation.resonance says"
+            return "none, as emit.compensation.resonance sets"
         return f"a {resonance}, see below" if self.rings(resonance) else self.compensation
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
 
-        Starts are spread evenly over log f. Anything faster or more damped is not seen to ring: in the records it is a
+        Starts are spaced evenly over log f. A faster or more damped mode does not visibly ring: in the records it is a
         delay or a lag. A lightly damped mode rings long, and is found from the frequency at which the residual rings.
         """
         low, high = _frequencies(about)
@@ -183,7 +183,7 @@ class Resonance(_Mode):
 class PartMode(_Mode):
     """Mode that carries a share of the motion: `y = (1 - share) h + share m`.
 
-    A stage has many modes; the contribution of each to the motion at rest is its share of the total compliance. Modes
+    A stage has many modes; the contribution of each to the static motion is its share of the total compliance. Modes
     far above the recorded frequencies follow at once (Preumont, Vibration Control of Active Structures, 2011, chapter
     2).
     """
@@ -196,7 +196,7 @@ class PartMode(_Mode):
     block: ClassVar[OwnBlock] = BLOCK
 
     def numbers(self, seconds: float) -> tuple[float, ...]:
-        """Numbers of the block, for steps of `seconds`."""
+        """The parameters of the block at steps of `seconds`."""
         zeta = self.damping
         c, s, ramp, step = (float(x[0]) for x in self.forced(np.array([seconds])))
         lead = self.share * (ramp - 1.0)
@@ -208,10 +208,10 @@ class PartMode(_Mode):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """As for a whole mode, with damping that lets it ring, up to 20 %, and up to half of the motion.
+        """As for a whole mode, but with at most 20 % damping, so that it rings, and at most half of the motion.
 
-        With three samples per period the inverse fades for shares up to 0.6, with more samples for larger ones; a mode
-        that carries most of the motion is a whole mode.
+        With three samples per period the inverse is stable for shares up to 0.6, with more samples for larger shares; a
+        mode that carries most of the motion is treated as a whole mode.
         """
         low, high = _frequencies(about)
 
@@ -231,7 +231,7 @@ class PartMode(_Mode):
 
 
 FIRST_SHARE = 0.1
-"""Share from which a search starts."""
+"""Share at which a search starts."""
 
 
 def _frequencies(about: About) -> tuple[float, float]:

@@ -18,7 +18,7 @@ typedef struct {
     hystgen_signal_t rate;
 } hystgen_resonance_part_t;
 
-/* Everything has settled at the input x. Returns the output. */
+/* Settles everything at the input x. Returns the output. */
 static hystgen_signal_t hystgen_resonance_part_rest(const hystgen_resonance_part_table_t *t,
                                                     hystgen_resonance_part_t *self,
                                                     hystgen_signal_t x) {
@@ -45,7 +45,7 @@ static hystgen_signal_t hystgen_resonance_part_solve(const hystgen_resonance_par
     return self->before + hystgen_product(&t->inverse, change);
 }
 
-/* The input is x at this sample. Returns the output. */
+/* Takes the input x at this sample. Returns the output. */
 static hystgen_signal_t hystgen_resonance_part_absorb(const hystgen_resonance_part_table_t *t,
                                                       hystgen_resonance_part_t *self,
                                                       hystgen_signal_t x) {

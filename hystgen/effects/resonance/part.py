@@ -1,8 +1,8 @@
-"""A mode that carries a share of the motion, as a block: unlike a whole mode, it passes the rest at once and has an
-inverse.
+"""A mode that carries a share of the motion, as a block: unlike a whole mode, it passes the other share at once and has
+an inverse.
 
 It keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, as `compensator` does for a
-whole mode. A change of the input adds a share of what it adds to a whole mode; the free oscillation is the same.
+whole mode. A change of the input adds the same share of its effect on a whole mode; the free oscillation is unchanged.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ BEFORE, OFF, RATE = range(3)
 
 
 def rest(t: Any, s: Any, x: Any) -> Any:
-    """Everything has settled at the input x. Returns the output."""
+    """Settle everything at the input x. Returns the output."""
     s[BEFORE] = x
     s[OFF] = product(t[NONE], x)
     s[RATE] = product(t[NONE], x)
@@ -36,7 +36,7 @@ def solve(t: Any, s: Any, y: Any) -> Any:
 
 
 def absorb(t: Any, s: Any, x: Any) -> Any:
-    """The input is x at this sample. Returns the output."""
+    """Take the input x at this sample. Returns the output."""
     change = x - s[BEFORE]
     off = s[OFF]
     rate = s[RATE]

@@ -16,7 +16,7 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays.slots import TANH
 
 STEEP = 4.0
-"""Largest argument of a tanh to which a displacement is inverted, in its levels: the inverse has slope 750 there."""
+"""[levels] Largest argument of the tanh that the inverse of a displacement may return; its slope is 750 there."""
 
 
 class Smooth(Map):
@@ -27,7 +27,7 @@ class Smooth(Map):
         self.level, self.centre, self.envelope = effect.level, effect.centre, effect.envelope
 
     def undone(self, y: Array) -> Array:
-        """As for any map; short of the level."""
+        """As for any map, but stopping short of the level."""
         most = np.nextafter(1.0, 0.0)
         share = np.clip((y - self.centre) / self.level, -most, most)
         return np.asarray(self.centre + self.level * np.arctanh(share))
@@ -45,19 +45,19 @@ class Smooth(Map):
         slope = slope / (1.0 - share * share)
         size, off = level * share, 1.0 if centre else 0.0
         back += u * (4.0 * size + level * (0.9 * kernels.ATANH_MAX_ULP[kind] + 2.0)) * slope
-        back += u * (2.0 * off * size + 5.0 * centre) * slope  # two more sums; a2, a3 and what they are added to
+        back += u * (2.0 * off * size + 5.0 * centre) * slope  # two more sums: a2 and a3 with their addends
         there += u * level * (4.0 + 2.0 * kernels.TANH_MAX_ULP[kind])
         there += u * (off * level + 6.0 * centre)
         return MapErrors(self.centre + level * np.arctanh(shares), slope, back, there)
 
     def grown(self, size: float, lsb: float) -> float:
-        """It takes no output farther from 0 than its centre is."""
+        """The size, or the centre's distance from 0 if larger: the map moves outputs towards its centre."""
         return max(size, abs(self.centre / lsb) + 1.0)
 
     def asked(
         self, back: float, ends: tuple[float, float], still: float, lsb: float
     ) -> tuple[float, tuple[float, float] | None]:
-        """At least what the model reaches at rest."""
+        """As for any map, but at least as large as the model reaches at rest."""
         centre = self.centre / lsb
         way = max(*(abs(end - centre) for end in ends), min(still + abs(centre), STEEP * (self.level / lsb)))
         reached = centre - way, centre + way
@@ -93,7 +93,7 @@ class Hard(Map):
     def asked(
         self, back: float, ends: tuple[float, float], still: float, lsb: float
     ) -> tuple[float, tuple[float, float] | None]:
-        """No farther than the limit."""
+        """As for any map, but no farther than the limit."""
         return min(back, self.upper / lsb + 1.0), None
 
 

@@ -12,18 +12,18 @@ from hystgen.basics.quantities import NotNegative, Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
-"""Starts within the output: a limit beyond the measured range does nothing, even if it changes a little."""
+"""Starts inside the output range: a limit beyond the measured range has no effect, even if it changes slightly."""
 
 
 MIDDLE = 0.5
-"""Centre from which a search starts, as a share of the output range from its lower end."""
+"""Centre at which a search starts, as a share of the output range from its lower end."""
 
 INSIDE, GIVE = (0.03, 0.1), 0.2
-"""Starting stops for a search: shares of the output range inside its ends, and the slope that remains beyond them."""
+"""Stops at which a search starts: shares of the output range inside its ends, and the slope remaining beyond them."""
 
 AWAY, FARTHEST = -0.3, 0.45
-"""Least and largest distance of the stops from the ends in a search, as shares of the range: outside, where they do
-nothing, and inside."""
+"""Bounds for the distance of the stops from the ends in a search, as shares of the range: outside, where they have no
+effect, and inside."""
 
 
 class _Saturation(Effect):
@@ -51,8 +51,8 @@ class _Level(_Saturation):
 class TanhSaturation(_Level):
     """Smooth limit `y = centre + level tanh((h - centre)/level)` of the output, before the offset is added.
 
-    A stage whose limits are the same in both directions has them around the middle of its travel, which for a unipolar
-    drive is not where the output is 0.
+    Limits that are the same in both directions lie around the middle of the stage's travel, where the output of a
+    unipolar drive is not 0.
     """
 
     shape: Literal["tanh"] = Field(default="tanh", description="smooth limit")
@@ -63,7 +63,7 @@ class TanhSaturation(_Level):
 
     @property
     def envelope(self) -> tuple[float, float, float, float]:
-        """a0 to a3 of the same curve as `a0 tanh(a1 h + a2) + a3`."""
+        """a0 to a3 of this curve in the form `a0 tanh(a1 h + a2) + a3`."""
         return self.level, 1.0 / self.level, 0.0 - self.centre / self.level, self.centre
 
     def mapped(self, y: Array, run: Run) -> Array:
@@ -72,7 +72,7 @@ class TanhSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to a thousand times it; then also the centre, within the
+        """The level, from a tenth of the output range to a thousand times that range; then also the centre, within the
         output."""
         low, high = about.drive
         bottom = about.output_range * low / (high - low)  # for plays without hysteresis
@@ -104,7 +104,7 @@ class HardSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to ten times it."""
+        """The level, from a tenth to ten times the output range."""
         return [cls._candidate(HARD, about, 1.0)]
 
 
@@ -114,8 +114,8 @@ HARD = "saturation behind, hard"
 class Stops(_Saturation):
     """Elastic stops at either end: beyond `upper` and `lower` the output continues with `give` times its slope.
 
-    A stage that meets a stop moves on as far as the stop's stiffness in parallel with its own allows, and its travel
-    need not be centred between the two.
+    Beyond a stop, the stage moves on against the stop's stiffness in parallel with its own; its travel need not be
+    centred between the two stops.
     """
 
     shape: Literal["stops"] = Field(description="elastic stops at either end")
@@ -126,7 +126,7 @@ class Stops(_Saturation):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """lower < upper."""
+        """The problem of the two stops unless lower < upper."""
         if not self.lower < self.upper:
             yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"
 

@@ -13,19 +13,19 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor it may overshoot."""
+"""Parabolas at which a search starts, 10 % at the end of the range: from a linear sensor the search may overshoot."""
 
 PIECES = (6, 12)
-"""Pieces of the monotone curves that are tried if a cubic helps. For a root over the range, six leave 1.3 times the
-noise and twelve 1.03; for an arctangent, or a tanh that ends at a sixth of its middle slope, six leave 9 to 10 times
-the noise and twelve 1.3 (`test_sensor_curves`, noise 0.02 % of the output)."""
+"""Numbers of pieces of the monotone curves that are tried if a cubic helps. For a square root over the range, the
+residual is 1.3 times the noise with six pieces and 1.03 with twelve; for an arctangent, or a tanh whose end slope is a
+sixth of its middle slope, 9 to 10 and 1.3 times (`test_sensor_curves`, noise 0.02 % of the output)."""
 
 STEEP = 3.0
-"""Largest logarithm of the ratio of two pieces' slopes: a factor of twenty, beyond which a sensor measures nothing on
+"""Largest logarithm of the ratio of two pieces' slopes: a factor of twenty, beyond which a sensor would be useless on
 one side."""
 
 MAX_KNOTS = 64
-"""Most knots of a curve: more than any calibration sheet of a sensor has."""
+"""Maximum number of knots of a curve: more than on any sensor's calibration sheet."""
 
 
 class _Sensor(Effect):
@@ -67,7 +67,7 @@ class SensorPolynomial(_Sensor):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """A parabola, then a cubic, over the output range; if that helps, with a quartic term."""
+        """A parabola, then a cubic, over the output range; if the cubic helps, also a quartic term."""
 
         def build(x: Array) -> SensorPolynomial:
             return cls(
@@ -87,9 +87,9 @@ CUBIC = "sensor, cubic"
 
 
 class SensorCurve(_Sensor):
-    """Sensor that reads `values` at `knots` and, between them, a smooth curve that rises everywhere; straight beyond.
+    """Sensor that reads `values` at `knots`, with a smooth curve in between that rises everywhere; linear beyond.
 
-    Cubic pieces whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning point
+    Cubic pieces whose slopes at the knots are harmonic means of the adjacent secants': the curve has no turning point
     (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
     """
 
@@ -104,12 +104,12 @@ class SensorCurve(_Sensor):
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """As many values as knots, both rising."""
+        """The problems of not having as many values as knots, both rising."""
         yield from not_as_many("values", self.values, "knots", self.knots)
         for key in ("knots", "values"):
             for k, (one, other) in enumerate(zip(getattr(self, key)[:-1], getattr(self, key)[1:], strict=True), 1):
                 if not other > one:
-                    yield (key, k), f"has to be above {one:g}, the entry before it"
+                    yield (key, k), f"has to be above {one:g}, the previous entry"
                     break
 
     def mapped(self, y: Array, run: Run) -> Array:
@@ -122,8 +122,8 @@ class SensorCurve(_Sensor):
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array]:
-        """The knots, and coefficients (4, pieces + 2) of powers of the distance from the knot below, including both end
-        pieces."""
+        """The knots, and coefficients (4, pieces + 2), including both end pieces, of powers of the distance from the
+        knot below."""
         x, y = np.array(self.knots), np.array(self.values)
         steps, slopes = np.diff(x), np.diff(y) / np.diff(x)
         at = np.concatenate([slopes[:1], 2.0 / (1.0 / slopes[:-1] + 1.0 / slopes[1:]), slopes[-1:]])
@@ -139,7 +139,7 @@ class SensorCurve(_Sensor):
     def candidates(cls, about: About) -> list[Candidate]:
         """Pieces of equal width over the measured output, with free slopes; tried if a cubic helps.
 
-        The ends stay fixed, since the weights and the offsets of the plays shift and stretch the output.
+        The ends stay fixed, since the weights of the plays and the offsets already stretch and shift the output.
         """
         low, high = about.output
         if not high > low:

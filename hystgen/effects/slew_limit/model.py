@@ -14,30 +14,30 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit that never or always acts leaves no trace."""
+"""[decades] Starts below the fastest recorded rate: a limit that acts never or always has no gradient to follow."""
 
 BESIDE = 10.0
-"""[times] A step of the drive is at least this many times faster than the changes next to it; those of a smooth drive
-are about equal. Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
-test_effects::test_sudden_edges_leave_other_drives_alone. A bend smaller than this share of a limit's travel per sample
-counts as straight: with 2, `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10 to 50
-it does not, and steps of `benchmarks.second_plants` (single 23015) are the same."""
+"""[times] A step of the drive is at least this many times faster than the adjacent changes, which are about equal in a
+smooth drive. Steps between levels at rest exceed it by far, limited only by the converter's noise. Changed by:
+test_effects::test_sudden_edges_leave_other_drives_alone. A bend smaller than the limit's travel per sample divided by
+this counts as straight: with 2, `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10
+to 50 it does not, and steps of `benchmarks.second_plants` (single 23015) are the same."""
 
 MIDDLE = 0.5
-"""[samples] Position of a step between two samples of a drive that was measured by averages over each sample. Derived:
-one average ends and the next begins halfway between the times of both."""
+"""[samples] Position of a step between two samples of a drive recorded as averages over each sample. Derived: one
+average ends and the next begins halfway between the two sample times."""
 
 LEAST = 3.0
-"""Decades from the fastest recorded rate down to the least one: a step from sample to sample is more than a hundred
-times faster than anything else."""
+"""[decades] From the fastest recorded rate down to the lowest rate tried: a step from sample to sample is more than a
+hundred times faster than any other change."""
 
 
 @jit
 def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
-    """`u`, straight between samples, followed by at most `up_k` upwards and `down_k` downwards per step.
+    """Follow `u`, linear between samples, by at most `up_k` upwards and `down_k` downwards per step.
 
-    If it is caught within a step, the output follows it for the rest of the step, or as fast as it may. `off`: mean
-    distance from `u` over each step.
+    If the output catches up within a step, it follows `u` for the rest of the step, as far as the limits allow. `off`:
+    mean distance from `u` over each step.
     """
     x = u[0]
     out[0] = x
@@ -64,9 +64,9 @@ def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: N
     """Write the drive with sudden edges into `times` and `drive`, and the position of each sample; returns its length.
 
     An edge is a change within one sample or two, `BESIDE` times as fast as its neighbours. With `edge` 1/2 it happens
-    at the mean time of the change: halfway between two samples or, if a converter that averages shows a sample on the
-    way, as long before the end of that sample as the sample is far along the step. Another `edge` moves it by as much
-    as between two samples. A linear filter distinguishes it from a straight edge only by second differences.
+    at the mean time of the change: halfway between two samples or, if an averaging converter shows a sample in between,
+    before the end of that sample by the share of the step that the sample shows. Any other `edge` shifts it by as much
+    as between two samples. A linear filter distinguishes it from a linear edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
@@ -123,7 +123,7 @@ class _SlewLimit(Effect):
         return self
 
     def time_scale(self, drive_range: float) -> float:
-        """The time of a move over the drive's range."""
+        """The duration of a move over the drive's range."""
         return drive_range / min(self.rate, self.falling_rate)
 
     def limited(self, u: Array, steps: Array) -> tuple[Array, Array]:
@@ -142,7 +142,7 @@ class _SlewLimit(Effect):
         def build(x: Array) -> Effect:
             numbers = {"rate": 10.0 ** float(x[0]), "falling_rate": 10.0 ** float(x[n - 1])}
             if anywhere:
-                numbers["edge"] = min(float(x[n]), 1.0)  # a derivative looks a little beyond
+                numbers["edge"] = min(float(x[n]), 1.0)  # a numerical derivative goes slightly beyond
             return cls(name="slew_limit", shape=shape, **numbers)  # type: ignore[call-arg]
 
         def beside(rates: Array, edge: float) -> Array:
@@ -158,9 +158,9 @@ STRAIGHT, SUDDEN = "slew limit", "slew limit, sudden steps"
 
 
 class SlewLimit(_SlewLimit):
-    """Slew limit `-S_falling <= a' <= S` of the drive: `a` goes towards `v` as fast as it may.
+    """Slew limit `-S_falling <= a' <= S` of the drive: `a` follows `v` as fast as the limit allows.
 
-    Exact for straight `v` between samples.
+    Exact if `v` is linear between samples.
     """
 
     shape: Literal["straight"] = Field(default="straight", description="the drive is straight between samples")
@@ -183,13 +183,13 @@ class SlewLimit(_SlewLimit):
 
 
 class SuddenSlewLimit(_SlewLimit):
-    """The same limit behind a drive whose steps take no time (`sudden`); otherwise it is straight between samples.
+    """The same limit behind a drive whose steps take no time (`sudden`) and which is linear between samples otherwise.
 
-    A generator steps where the record has a change within a sample or two. If that is taken as straight, the limited
-    edge begins up to a sample early, and everything until it arrives is early by as much. When the drive steps within
-    that time depends on how it was recorded: halfway in averages over each sample, at the later sample if a command was
-    recorded when the converter took it, at the earlier one if the converter already had it by then. In a record of
-    averages, the signal behind the limit is an average too.
+    A generator steps where the record shows a change within a sample or two. If this change is taken as linear, the
+    limited edge begins up to a sample early, and the whole edge is early by as much. When the drive steps within that
+    time depends on how it was recorded: halfway if samples are averages, at the later sample if a command was recorded
+    when the converter took it, at the earlier sample if the converter already had it by then. In a record of averages,
+    the signal behind the limit is an average too.
     """
 
     shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
@@ -212,8 +212,8 @@ class SuddenSlewLimit(_SlewLimit):
         """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: its value at the
         sample.
 
-        Where the drive steps or is straight, a sample `a` is its mean, and the mean distance is added. Where it bends,
-        `a` is not its mean, and the bend would exceed the limit: `then` is used.
+        Where the drive steps or is linear, a sample `a` is its mean, and the mean distance is added. Where it bends,
+        `a` is not its mean, and the bend would exceed the limit: `then` is used instead.
         """
         ends = 0.5 * (t[:-1] + t[1:])
         at = np.searchsorted(times, ends)
@@ -230,7 +230,7 @@ class SuddenSlewLimit(_SlewLimit):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Tried if a limit helps: one rate, one for each direction, and both with another position of the steps."""
+        """Tried if a limit helps: one rate, one for each direction, and both with the position of the steps free."""
         both = "rising and falling"
         return [
             cls._candidate(SUDDEN, 1, about, beyond=STRAIGHT, grown=lambda x: x),

@@ -1,4 +1,4 @@
-"""Temperatures as blocks: gain and offset that the caller sets, or that follow the drive's own heat."""
+"""Temperatures as blocks: gain and offset set by the caller, or following the drive's own heat."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class GainTable(Struct):
 
 
 class GainNumbers(GainTable):
-    """The same with a number that is not in the table in C."""
+    """The same with a constant that is not in the table in C."""
 
     one: Real
 
@@ -70,7 +70,7 @@ class Warm(One):
     effect: LoggedThermal | OwnHeat
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """Properties of the gain; the C leaves out the heat of one sample."""
+        """Properties of the gain; the C ignores the heat of the present sample."""
         effect = self.effect
         if isinstance(effect, LoggedThermal):
             return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
@@ -81,20 +81,20 @@ class Warm(One):
         return Gained(9.0, least, largest, wrong, warmed + wrong)  # the temperature has roundings too
 
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
-        """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
+        """Largest move of a drive within `ends` that may be repeated in every step; `span`: of the output."""
         return math.inf if isinstance(self.effect, LoggedThermal) else farthest(self.effect, ends, span, seconds)
 
     def grown(self, size: float, margin: Margin) -> float:
-        """Largest output for inputs within a size."""
+        """Largest output for inputs of magnitude up to `size`."""
         return size * LARGEST_GAIN + margin.span
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that the inverse gives for outputs within `asked`."""
+        """Largest answer of the inverse for outputs up to `asked`."""
         return (asked + margin.span) / LEAST_GAIN
 
 
 def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
-    """The numbers of several gains in floating point."""
+    """The tables of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     given = [(*numbers(each, about.span), LEAST_GAIN, LARGEST_GAIN, 1.0) for each in effects]
     rows = about.reals(given, "temperatures")
@@ -102,9 +102,9 @@ def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, float, float]:
-    """Constants of a block behind which the output spans `span`: rates, reference, and the limits of the temperature.
+    """Constants of a block for an output that spans `span`: rates, reference, and the limits of the temperature.
 
-    Beyond them the gain would leave its limits, or the offset alone would exceed the span.
+    Beyond these limits the gain would leave its own, or the offset alone would exceed the span.
     """
     ends = [math.inf]
     if effect.gain_per_degree:
@@ -113,7 +113,7 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, fl
         ends += [span / effect.offset_per_degree, -span / effect.offset_per_degree]
     up = min((end for end in ends if end > 0.0), default=math.inf)
     down = max((end for end in ends if end < 0.0), default=-math.inf)
-    largest = 1e6  # degrees; where a temperature does nothing
+    largest = 1e6  # degrees; if the temperature has no effect
     return (
         effect.gain_per_degree, effect.offset_per_degree, effect.reference,
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
@@ -171,18 +171,18 @@ def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # n
 
 
 class HeatTable(Struct):
-    """Own heat: degrees per amount of what warms, and the share lost in a step."""
+    """Own heat: degrees per amount of heat, and the share lost per step."""
 
     rate: Real
     per_amount: Real
     per_degree: Real
     offset_per_degree: Real
-    hottest: Real  # rise up to which gain and offset follow
+    hottest: Real  # temperature rise up to which gain and offset follow
     turns: Count  # Newton steps for the reciprocal of a gain that has changed
 
 
 class HeatNumbers(HeatTable):
-    """The same with numbers that are not in the table in C."""
+    """The same with constants that are not in the table in C."""
 
     one: Real
     two: Real
@@ -208,7 +208,7 @@ class FrictionPlay(Struct):
 
 
 class FrictionTable(Struct):
-    """Plays that rub, the narrowest one first."""
+    """Rubbing plays, smallest threshold first."""
 
     n: Count
 
@@ -222,7 +222,7 @@ class FrictionPlayState(Struct):
 class FrictionState(Struct):
     """Plays that rub."""
 
-    begun: Flag  # they are somewhere
+    begun: Flag  # the plays have positions
 
 
 FRICTION_KIND = Kind(
@@ -230,14 +230,14 @@ FRICTION_KIND = Kind(
 )
 
 FRICTION_PLAYS = 16
-"""Plays that represent the continuum of rubbing plays: loops warm as with the continuum, within a 1000th of the warmest
-rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times the
-error there, with 16 it is 5.3 times."""
+"""Plays that represent the continuum of rubbing plays: loops heat as with the continuum, to within a thousandth of the
+largest rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times
+the error in that test, with 16 it is 5.3 times."""
 
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `block` (k,), `friction` (k,), without plays where the drive's square is the heat; the plays
-    that rub, of each block from `first` (k + 1) on in `play` (m,)."""
+    """Own heat of a model: `block` (k,); `friction` (k,), without plays if the drive's square is the heat; `play` (m,):
+    the rubbing plays, those of each block from `first` (k + 1) on."""
 
     block: HeatNumbers
     friction: FrictionTable
@@ -246,7 +246,7 @@ class HeatTables(NamedTuple):
 
 
 class HeatMemory(NamedTuple):
-    """Memory of all blocks: `block` (k,), and of the plays that rub, `friction` (k,) and `play` (m,)."""
+    """Memory of all blocks: `block` (k,), and of the rubbing plays, `friction` (k,) and `play` (m,)."""
 
     block: HeatState
     friction: FrictionState
@@ -259,7 +259,7 @@ def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
 
 
 def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
-    """Thresholds of the rubbing plays, in the middles of equal parts of their reach; none without friction."""
+    """Thresholds of the rubbing plays, at the centres of equal parts of their reach; none without friction."""
     if not isinstance(effect, HysteresisHeating):
         return []
     half = 0.5 * reach(effect, ends) / FRICTION_PLAYS
@@ -267,8 +267,8 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
 
 
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
-    """Final rise per unit of heat in each step: of the change of the drive's signed square, or of the rubbing plays'
-    moves, each times its threshold as an odd multiple of the first."""
+    """Final temperature rise per unit of heat in each step; heat is the change of the drive's signed square, or the sum
+    of the rubbing plays' moves, each times its threshold as an odd multiple of the first."""
     if not isinstance(effect, HysteresisHeating):
         return effect.heating * 0.25 / seconds
     cell = reach(effect, ends) / FRICTION_PLAYS
@@ -276,7 +276,7 @@ def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> fl
 
 
 def most_amount(effect: OwnHeat, ends: tuple[float, float], move: float) -> float:
-    """Largest heat of a step in which the drive moves by `move` within `ends`: a play with threshold r moves by no more
+    """Largest heat of a step in which the drive moves by `move` within `ends`: a play with threshold r moves no farther
     than the drive can go beyond r."""
     if isinstance(effect, HysteresisHeating):
         span = ends[1] - ends[0]
@@ -288,12 +288,12 @@ def most_amount(effect: OwnHeat, ends: tuple[float, float], move: float) -> floa
 
 
 def lost(effect: OwnHeat, seconds: float) -> float:
-    """Share of a rise that is lost in a step."""
+    """Share of a temperature rise that is lost in a step."""
     return -math.expm1(-seconds / effect.time_constant)
 
 
 def risen(effect: OwnHeat, rise: float, heat: float, seconds: float) -> float:
-    """The temperature's rise after a step whose heat would, if kept up, raise it to `heat`."""
+    """The temperature rise after a step whose heat, if sustained, would cause a final rise of `heat`."""
     return rise + lost(effect, seconds) * (heat - rise)
 
 
@@ -303,12 +303,12 @@ def most_at_once(effect: OwnHeat, ends: tuple[float, float], move: float, second
 
 
 def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> float:
-    """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than the C can
-    follow. `span`: as in `heat_numbers`."""
+    """Largest move of the drive within `ends` that may be repeated in every step without exceeding the temperature that
+    the C can follow. `span`: as in `heat_numbers`."""
     hottest = heat_numbers(effect, ends, span, seconds)[-1]
     amount = hottest / per_amount(effect, ends, seconds) if effect.heating else math.inf
     if isinstance(effect, HysteresisHeating):
-        return amount / FRICTION_PLAYS**2  # all of them follow
+        return amount / FRICTION_PLAYS**2  # all plays follow
     largest = max(map(abs, ends))
     if amount < largest * largest:
         return amount / (largest + math.sqrt(largest * largest - amount))  # from the end of the range inwards
@@ -316,23 +316,23 @@ def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: f
 
 
 def reached(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
-    """The largest rise from a drive that moves by at most `move` a step within `ends`, and the least and the largest
-    gain on the way."""
+    """The largest temperature rise from a drive that moves by at most `move` per step within `ends`, and the least and
+    largest gain up to that rise."""
     warmest = most_at_once(effect, ends, move, seconds) / lost(effect, seconds)
     gain = min(max(1.0 + effect.gain_per_degree * warmest, LEAST_GAIN), LARGEST_GAIN)
     return warmest, min(gain, 1.0), max(gain, 1.0)
 
 
 def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> float:
-    """How far the rise can be from the rise by the continuum of plays, degrees, for moves up to `move` a step.
+    """How far the rise can be from that caused by the continuum of plays, in degrees, for moves up to `move` per step.
 
-    After a move of 2x from a turning point, the plays up to x follow. With the middles of n cells of width h instead,
-    the loss per unit of the move is wrong by `g(x) = x^2/2 - h sum r_i`, which within a cell is first positive, then
-    negative, and `|integral of g from 0 to x| <= 0.0873 h^2 x`, reached at `x = (3/4)^(1/3) h`. By rainflow counting,
-    any drive consists of whole runs from a turning point, with x from 0 on, and of runs that were under way when it
-    began. In each direction the x of the latter only grows, so they are wrong by at most the integral of the negative
-    parts of 2 g over the reach, `h reach^2/8 (1 + 2/(3n))`; the positive parts contribute less. The temperature
-    forgets, so no later loss has less weight than an earlier one.
+    After a move of 2x from a turning point, the plays up to x follow. With plays only at the centres of n cells of
+    width h, the loss per unit of the move is off by `g(x) = x^2/2 - h sum r_i`, which within a cell is first positive,
+    then negative, and `|integral of g from 0 to x| <= 0.0873 h^2 x`, reached at `x = (3/4)^(1/3) h`. By rainflow
+    counting, any drive consists of whole runs from a turning point, with x from 0 on, and of runs already under way at
+    its start. In each direction the x of the latter only grows, so they are wrong by at most the integral of the
+    negative parts of 2 g over the reach, `h reach^2/8 (1 + 2/(3n))`; the positive parts contribute less. The
+    temperature decays, so no later loss has less weight than an earlier one.
     """
     if not isinstance(effect, HysteresisHeating):
         return 0.0
@@ -343,11 +343,11 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
 
 
 def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
-    """Error of the rise from the rubbing plays, degrees; `emitted`: against the continuum of plays."""
+    """Error of the rise from the rubbing plays, in degrees; `emitted`: against the continuum of plays."""
     widths = thresholds(effect, speed.ends)
     if not widths:
         return 0.0
-    # each play is off by one rounding, or by three if it stays because another one does
+    # each play is off by one rounding, or by three if it stays because another play does
     amount = len(widths) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + widths[-1])
     amount += (len(widths) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
     found = amount * per_amount(effect, speed.ends, speed.seconds)
@@ -357,8 +357,8 @@ def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
 def heat_numbers(
     effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float
 ) -> tuple[float, float, float, float, float]:
-    """Constants of a block behind which the output spans `span`, at steps of `seconds`, of drives within `ends`."""
-    hot = [1e6]  # degrees; where a temperature does nothing
+    """Constants of a block for an output that spans `span` and drives within `ends`, at steps of `seconds`."""
+    hot = [1e6]  # degrees; if the temperature has no effect
     if effect.gain_per_degree:
         hot += [(limit - 1.0) / effect.gain_per_degree for limit in (LEAST_GAIN, LARGEST_GAIN)]
     if effect.offset_per_degree:
@@ -416,7 +416,7 @@ def heat_way(before: N, v: N) -> N:
 
 @jit
 def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> None:
-    """The drive has moved to v."""
+    """Note that the drive has moved from `before` to v."""
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     high = s.block.high[j]
     change = (t.block.per_amount[j] * amount - t.block.rate[j] * high) + s.block.low[j]
@@ -448,7 +448,7 @@ def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # n
 # ---------------------------------------------------------------- friction.c
 
 def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
-    """The rubbing plays of each block, `each` with so many products; None where none rub."""
+    """The rubbing plays of each block, with `each` products per play; None if the block has none."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])
         yield Constants(kind, row, (each * n, 0), t.play[first : first + n]) if n else None
@@ -456,8 +456,8 @@ def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Ite
 
 @jit
 def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
-    """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
-    threshold as an odd multiple of the first. Where a play stays, wider ones do too."""
+    """Move the drive to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
+    threshold as an odd multiple of the first. If a play stays, so do those with larger thresholds."""
     one = t.block.one[j]
     if not s.friction.begun[j]:
         s.friction.begun[j] = 1
@@ -492,7 +492,7 @@ class UnevenHeat:
         self.first, self.corner, self.depth, self.up = math.nan, np.empty(16), 0, True
 
     def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
-        """Final rise at the heat of a move, and the state of friction after it."""
+        """Final rise for the heat of a move, and the state of friction after the move."""
         effect = self.effect
         if isinstance(effect, HysteresisHeating):
             if self.depth == len(self.corner):
@@ -502,7 +502,7 @@ class UnevenHeat:
         return effect.heating * 0.25 * heat_way(before, drive) / seconds, 0, True
 
     def _risen(self, before: float, drive: float, seconds: float) -> float:
-        """The rise after the drive has moved from `before`; unchanged at the first sample."""
+        """The rise after the drive has moved from `before` to `drive`; unchanged at the first sample."""
         if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
             return self.rise
         return risen(self.effect, self.rise, self._heat(before, drive, seconds)[0], seconds)
@@ -513,7 +513,7 @@ class UnevenHeat:
         return (y - self.effect.offset_per_degree * rise) / (1.0 + self.effect.gain_per_degree * rise)
 
     def move(self, before: float, drive: float, seconds: float) -> None:
-        """The drive has gone there."""
+        """Note that the drive has moved from `before` to `drive`."""
         if math.isnan(before):
             self.first = drive
         elif seconds > 0.0:
@@ -543,12 +543,12 @@ HEAT_PART = ChainPart(
     problems=heat_problems, following=UnevenHeat,
     unmeasured=Unmeasured(
         "self_heating",
-        "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
+        "the drive's own heat, open loop: the temperature also changes with the room's; measure it, or have it "
         "followed by emit.compensation.compensate: [self_heating]",
-        "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's",
+        "thermal from the drive's own heat (the temperature is not measured, and changes with the room's",
     ),
     code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.friction.n.any())),
 )
-"""Temperatures as parts of the chain: set by the caller, or from own heat."""
+"""Temperatures as parts of the chain: set by the caller, or caused by the drive's own heat."""
 
 PARTS = (HEAT_PART, GAIN_PART)

@@ -40,13 +40,13 @@ from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Counts, firsts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
-"""[share of the signal] Error of a gain linear in a temperature: one product."""
+"""[share of the signal] Error of a gain that is linear in a temperature: one product."""
 
 FACTOR_ERROR = 2.0**-MANTISSA_BITS
-"""[share of a product] Error of a factor: half of its last bit. A temperature's reference has the same error."""
+"""[share of a product] Error of a factor: half a last bit. The reference temperature has the same error."""
 
 TEMPERATURE_BITS = 37
-"""Fraction bits of an internal temperature, so that temperatures of 512 degC are multiplied like any signal."""
+"""Fraction bits of an internal temperature, so that temperatures up to 512 degC can be multiplied like any signal."""
 
 
 Numbers = tuple[float, float, float, float, float]
@@ -68,8 +68,8 @@ KIND = replace(floating.KIND, table=FixedGainTable)
 
 
 def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
-    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output, `bits`: how many a
-    temperature has below a code; `degrees`: the largest code. Raises OverflowError."""
+    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: of a
+    temperature below a code; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
     for per_degree, offset_per_degree, *ends in rows:
@@ -80,13 +80,13 @@ def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> 
 
 @dataclass(frozen=True)
 class GainFormats(Coded):
-    """A gain by its numbers in floating point."""
+    """A gain, given by its constants in floating point."""
 
     one: Warm
     numbers: Numbers
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """The gain's properties, for inputs within a size."""
+        """The gain's properties, for inputs up to `size`."""
         return linear(self.one.effect, size, at, 2.0 ** -(TEMPERATURE_BITS + 1), 0.0, LEAST_GAIN, LARGEST_GAIN, at.span)
 
 
@@ -94,7 +94,7 @@ def linear(
     effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
     largest: float, offset: float,
 ) -> CodedGain:
-    """A gain linear in a temperature that is off by `wrong` degrees and moves by `at_once` degrees in a sample."""
+    """A gain linear in a temperature that is off by `wrong` degrees and changes by `at_once` degrees per sample."""
     degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
     there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
     back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
@@ -161,15 +161,15 @@ def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: int) -> int:  # noqa
 # ---------------------------------------------------------------- heat_fixed.c
 
 RISE_BITS = 59
-"""Bits of the largest rise of the temperature that a drive can make."""
+"""Bits of the largest temperature rise that a drive can cause."""
 
 AMOUNT_BITS = 50
-"""Bits of a step's heat, and of a temperature, in a product."""
+"""Bits of the heat of a step, and of a temperature, in a product."""
 
 
 class FixedHeatTable(Struct):
-    """Own heat: degrees gained per amount of what warms, the share lost in a step, and the rise up to which gain and
-    offset follow."""
+    """Own heat: degrees gained per amount of heat, the share lost per step, and the temperature rise up to which gain
+    and offset follow."""
 
     rate: Factor
     per_amount: Factor
@@ -177,15 +177,15 @@ class FixedHeatTable(Struct):
     offset_per_degree: Factor
     hottest: Int64
     turns: Count  # Newton steps for the reciprocal of a gain that has changed
-    coarse: UInt8  # bits of an amount that its product leaves out,
-    lift: UInt8  # bits of the temperature that the same product leaves out,
-    drop: UInt8  # and bits that products of the temperature leave out
+    coarse: UInt8  # bits of an amount that its product drops,
+    lift: UInt8  # bits of the temperature that the same product drops,
+    drop: UInt8  # and bits that products with the temperature drop
 
 
 class FixedHeatState(Struct):
     """A block."""
 
-    rise: Int64  # of the temperature over the surroundings
+    rise: Int64  # temperature above the surroundings
     gain: Int32
     inverse: Int32
     offset: Int64
@@ -195,7 +195,7 @@ HEAT_KIND = replace(floating.HEAT_KIND, table=FixedHeatTable, state=FixedHeatSta
 
 
 class FixedFrictionTable(FrictionTable):
-    """Plays that rub, as in floating point."""
+    """Rubbing plays, as in floating point."""
 
     bits: UInt8  # of a play below a drive code
 
@@ -232,7 +232,7 @@ class Heat(Coded):
     one: Warm | None = None
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """The gain's properties, for inputs within a size."""
+        """The gain's properties, for inputs up to `size`."""
         assert self.one is not None
         effect: Any = self.one.effect
         wrong = self.error + floating.coarseness(effect, *speed)
@@ -246,8 +246,8 @@ def heat(
     numbers: Numbers, turns: int, thresholds: Sequence[float], largest: int, lsb: float, level: float, code_bits: int
 ) -> Heat:
     """Own heat from `numbers` as in `heat_numbers`, Newton steps, `thresholds` as in the function of that name, drives
-    up to `largest` codes of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises
-    OverflowError."""
+    up to `largest` codes of `lsb` and `code_bits` bits, and `level` signals per unit of the output. Raises
+    OverflowError if a number does not fit."""
     rate, per_amount, per_degree, offset_per_degree, hottest = numbers
     if thresholds:
         bits = STATE_BITS - code_bits  # of a play below a drive code
@@ -304,7 +304,7 @@ def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa:
 
 @jit
 def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> None:
-    """The drive has moved to v."""
+    """Note that the drive has moved from `before` to v."""
     n = t.block
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     warmer = times(nearest(amount, n.coarse[j]), n.per_amount.mantissa[j], n.per_amount.shift[j]) << n.lift[j]
@@ -337,7 +337,7 @@ def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: int) -> int: 
 # ---------------------------------------------------------------- friction_fixed.c
 
 STATE_BITS = 31
-"""Bits of a rubbing play, without its sign: a drive has 15 or 31 of them with it."""
+"""Bits of a rubbing play, excluding its sign; a drive takes 15 or 31 of them."""
 
 @jit
 def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> int:

@@ -1,5 +1,5 @@
 /* Gain and offset from self-heating, which follows from the applied drives. In fixed point the
-   temperature has as many bits as fit in 64, so that a slow one does not stall. Called by the
+   temperature has as many bits as fit in 64, so that slow changes do not stall. Called by the
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED

@@ -19,7 +19,7 @@ COLUMN = "temperature"
 SELF_HEATING = "thermal, self-heating"
 
 SHARES = (0.3, 0.15, 0.5)
-"""Starts of searches, as shares of the way from the longest time constant down to the shortest."""
+"""Starts of searches, as shares of the logarithmic distance from the longest time constant down to the shortest."""
 
 SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 """[decimal logarithms of ranges of the drive] Reach of the rubbing elements: bounds and start of a search."""
@@ -27,10 +27,10 @@ SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 
 @jit
 def rubbed(way: float, reach: float) -> float:
-    """Friction loss of plays with thresholds up to `reach` on a move along which more and more of them follow.
+    """Friction loss of plays with thresholds up to `reach` on a move along which more and more plays follow.
 
-    One with threshold r follows after r and then loses r per unit of the move; together they lose
-    `min(way, reach)^2/2`.
+    A play with threshold r begins to follow after r and then loses r per unit of the move; together the plays lose
+    `min(way, reach)^2/2` per unit.
     """
     rising = min(way, reach)
     return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
@@ -40,12 +40,12 @@ def rubbed(way: float, reach: float) -> float:
 def lost_on(
     w: float, x: float, first: float, reach: float, corner: Array, depth: int, up: bool
 ) -> tuple[float, int, bool]:
-    """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `first`, lose on the way from `w`
-    to `x`, with the number of turning points and the direction after it.
+    """Energy lost by plays of all thresholds up to `reach`, equally dense and relaxed at `first`, on the move from `w`
+    to `x`, with the number of turning points and the direction after the move.
 
-    After a turning point a play follows once the move is twice its threshold. Turning points that are passed are
+    After a turning point a play follows once the move exceeds twice its threshold. Turning points that are passed are
     forgotten (Madelung's rules): the move then continues from an earlier one, or on the initial curve. `corner`: the
-    `depth` earlier turning points, which are left unchanged; a new one is written after them.
+    `depth` earlier turning points, which are left unchanged; a new turning point is written after them.
     """
     energy = 0.0
     if x == w:
@@ -122,7 +122,7 @@ class LoggedThermal(_Thermal):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Gain, offset, both; none without a temperature in every record."""
+        """Gain, offset, both; no candidates unless every record has a temperature."""
         if COLUMN not in about.columns:
             return []
         found = []
@@ -139,7 +139,7 @@ class LoggedThermal(_Thermal):
 
 
 class OwnHeat(_Thermal):
-    """Gain and offset from a temperature that the drive itself causes: `tau T' + T = heat`, T 0 at the start."""
+    """Gain and offset from a temperature rise that the drive itself causes: `tau T' + T = heat`, T = 0 at the start."""
 
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
     heating: NotNegative
@@ -155,10 +155,10 @@ class OwnHeat(_Thermal):
 
     @abstractmethod
     def heat(self, run: Run) -> Array:
-        """Final rise at the heat of each step (N - 1,), K."""
+        """Final rise for the heat of each step (N - 1,), K."""
 
     def above(self, run: Run) -> Array:
-        """Temperature rise, K; cached, since a search comes back to it with other gains and offsets."""
+        """Temperature rise, K; cached, since a search reuses it with other gains and offsets."""
         numbers = self.model_dump(exclude={"gain_per_degree", "offset_per_degree"})
         return run.remembered((type(self), *numbers.values()), lambda: self._rise(run))
 
@@ -172,8 +172,8 @@ class OwnHeat(_Thermal):
 class SelfHeating(OwnHeat):
     """Gain and offset of self-heating: `tau T' + T = heating |v v'|/2`, T above the reference, 0 at the start.
 
-    A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` on average, the law of dielectric loss; one
-    thermal resistance and capacity carry the heat away. The heat of a step is spread evenly over it.
+    A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` on average, the law of dielectric loss; the
+    stage has one thermal resistance and one heat capacity. The heat of a step is spread evenly over the step.
     """
 
     source: Literal["self_heating"] = Field(description="temperature from the drive's own heat")
@@ -185,7 +185,7 @@ class SelfHeating(OwnHeat):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Time constant with gain, with offset, with both; heating is such that a session warms by about 1 K."""
+        """Time constant with gain, with offset, with both; heating is scaled so that a session warms by about 1 K."""
         power = max(map(abs, about.drive)) * about.travel / (2.0 * max(about.session, about.sample_time))
         heating = 1.0 / max(power, 1e-12)
         found = []
@@ -212,12 +212,12 @@ class HysteresisHeating(OwnHeat):
 
     `q` is the power that plays of all thresholds up to `reach`, equally dense, lose to friction, input units^3/s:
     `2/3 f V^3` for amplitudes V below the reach (Rayleigh's law: Damjanovic, Rep. Prog. Phys. 61 (1998) 1267), wherever
-    the loop lies, and growing with V far above it.
+    the loop lies, and proportional to V far above the reach.
     """
 
     source: Literal["hysteresis"] = Field(description="temperature from the heat of the loops")
     heating: NotNegative = Field(description="K s/input^3: heating 2/3 f V^3 is the final rise", examples=[1.0e-6])
-    reach: Positive = Field(description="largest half width of what rubs, input units", examples=[30.0])
+    reach: Positive = Field(description="largest threshold of the rubbing plays, input units", examples=[30.0])
 
     def heat(self, run: Run) -> Array:
         """`heating q`, the loss of each step spread evenly over it."""
@@ -261,10 +261,10 @@ class HysteresisHeating(OwnHeat):
 
 
 def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, Array, Array, tuple[Array, ...]]:
-    """Bounds, start and further starts of the numbers: time constant, then a gain, an offset or both.
+    """Bounds, start and further starts of the parameters: time constant, then a gain, an offset or both.
 
-    The temperature changes from loop to loop, not within one: anything that follows the drive within a quarter of a
-    full-range loop is not a temperature.
+    A temperature changes from loop to loop, not within a loop: an effect that follows the drive within a quarter of a
+    full-range loop is not thermal.
     """
     n = sum(place is not None for place in row)
     low, high = span(20.0 * about.sample_time, 3.0 * about.session)
@@ -276,20 +276,20 @@ def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, A
 
 
 def _levels_off(about: About) -> tuple[int, float]:
-    """The time constant, and the session: a temperature that has not levelled off by its end follows the work done so
-    far, which grows with time like much else."""
+    """Index of the time constant, and its limit, the session: a temperature that has not levelled off by then follows
+    the work done so far, which grows with time like much else."""
     return 0, math.log10(max(about.session, 1e-12))
 
 
 def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple[float, float]:
-    """Gain and offset per degree, taken from the numbers of a search."""
+    """Gain and offset per degree, taken from the parameters of a search."""
     gain, offset = (0.0 if place is None else float(x[place]) for place in row)
     return 0.01 * gain, 0.01 * about.output_range * offset
 
 
 def _kept(share: Array) -> Array:
     """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's heat
-    has no part in it."""
+    does not enter."""
     return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 

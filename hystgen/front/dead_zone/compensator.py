@@ -8,7 +8,7 @@ from hystgen.front.stage import StageTables
 
 @jit
 def dead_zone(t: StageTables, first: int, n: int, x: Scalar, inverse: int) -> Scalar:
-    """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map, swapped."""
+    """Evaluate the linear piece on which x lies; the inverse uses the forward map's tables, swapped."""
     d = t.stage_data
     breaks = first + n * inverse
     anchor_in = first + 2 * n + (n + 1) * inverse

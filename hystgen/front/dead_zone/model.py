@@ -1,4 +1,4 @@
-"""Dead-zone sums: a piecewise straight map in front of the plays, and its inverse."""
+"""Dead-zone sums: a piecewise linear map in front of the plays, and its inverse."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class Pieces(NamedTuple):
-    """A piecewise straight map: breaks and the values there, and a point and the slope of each piece."""
+    """A piecewise linear map: its breaks, the values there, and a point and the slope of each piece."""
 
     breaks: tuple[float, ...]
     values: tuple[float, ...]
@@ -50,7 +50,7 @@ class DeadZone:
 
     @property
     def branches_differ(self) -> bool:
-        """One curve serves both directions."""
+        """False: both directions share one curve."""
         return False
 
     @cached_property
@@ -60,7 +60,7 @@ class DeadZone:
 
     @cached_property
     def piece_slopes(self) -> tuple[float, ...]:
-        """Slopes of the straight pieces, one more than there are breaks: the partial sums of the weights."""
+        """Slopes of the linear pieces, one more than there are breaks: the partial sums of the weights."""
         zero = self.thresholds.index(0.0)
         eta = self.weights
         left = [math.fsum(eta[j : zero + 1]) for j in range(zero)]
@@ -69,7 +69,7 @@ class DeadZone:
 
     @cached_property
     def anchors(self) -> tuple[tuple[float, float], ...]:
-        """A point of each piece: its break next to zero, or the origin for the piece that contains it."""
+        """A point of each piece: its break nearest to zero, or the origin for the piece that contains it."""
         middle = sum(1 for b in self.breaks if b < 0)
         points = []
         for j in range(len(self.piece_slopes)):
@@ -78,7 +78,7 @@ class DeadZone:
         return tuple(points)
 
     def _value(self, x: float) -> float:
-        if math.isinf(x):  # the end piece decides, since its terms may cancel
+        if math.isinf(x):  # take the sign from the end piece's slope, since infinite terms may cancel
             slope = self.piece_slopes[-1 if x > 0 else 0]
             return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
         rho, eta, least, most = self._terms
@@ -86,7 +86,7 @@ class DeadZone:
 
     @cached_property
     def _terms(self) -> tuple[Array, Array, Array, Array]:
-        """rho, eta, and the least and largest value of `x - rho` in each term."""
+        """rho, eta, and the limits of `x - rho` in each term."""
         rho, eta = np.array(self.thresholds), np.array(self.weights)
         return rho, eta, np.where(rho > 0, 0.0, -math.inf), np.where(rho < 0, 0.0, math.inf)
 
@@ -101,7 +101,7 @@ class DeadZone:
         return np.array(self.breaks), np.array(self.anchors), np.array(self.piece_slopes)
 
     def forward(self, x: ArrayLike, ascending: bool = True) -> Array:
-        """Value at x; both directions share it."""
+        """Value at x, in both directions."""
         points = np.asarray(x, dtype=np.float64)
         breaks, anchors, slopes = self._all_pieces
         piece = np.searchsorted(breaks, points, side="right")
@@ -130,7 +130,7 @@ class DeadZone:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x in [low, high] with the value y (the map has to rise there); outside, the end pieces continue."""
+        """The x in [low, high] with the value y, where the map has to rise; beyond, the end pieces are extended."""
         ends, anchors, slopes = self._inverses(low, high)
         values = np.asarray(y, dtype=np.float64)
         piece = np.searchsorted(ends, values, side="right")
@@ -138,7 +138,7 @@ class DeadZone:
         return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / slopes[piece])
 
     def _inverses(self, low: float, high: float) -> tuple[Array, Array, Array]:
-        """Values at the breaks, anchors and slopes of `over` as arrays, made once per range."""
+        """Values at the breaks, anchors and slopes from `over` as arrays, computed once per range."""
         if (low, high) not in self._inverted:
             kept = self.over(low, high)
             self._inverted[low, high] = np.array(kept.values), np.array(kept.anchors), np.array(kept.slopes)
@@ -149,7 +149,7 @@ class DeadZone:
         return {}
 
     def over(self, low: float, high: float) -> Pieces:
-        """The straight pieces within [low, high]; the first and the last continue beyond it."""
+        """The linear pieces within [low, high]; the first and the last continue beyond it."""
         first, last = self._pieces(low, high)[0], self._pieces(low, high)[-1]
         breaks = self.breaks[first:last]
         return Pieces(
@@ -165,7 +165,7 @@ class DeadZone:
         return range(first, max(first, last) + 1)
 
     def image(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
-        """Least and largest value over [low, high]; they are at the ends or at breaks."""
+        """Least and largest value over [low, high], which occur at the ends or at breaks."""
         inside = slice(bisect.bisect_right(self.breaks, low), bisect.bisect_left(self.breaks, high))
         values = (self._value(low), self._value(high), *self._values[inside])
         return min(values), max(values)
@@ -176,11 +176,11 @@ class DeadZone:
         return min(slopes), max(slopes)
 
     def inverse_problems(self, low: float, high: float) -> list[str]:
-        """The pieces inside [low, high] whose partial sum of weights is not positive."""
+        """Descriptions of the pieces within [low, high] whose partial sum of weights is not positive."""
         edges = (-math.inf, *self.breaks, math.inf)
         return [
             f"the dead-zone weights sum to {self.piece_slopes[j]:.6g} between {max(edges[j], low):.6g} and "
-            f"{min(edges[j + 1], high):.6g}, every partial sum with eta_0 has to be positive"
+            f"{min(edges[j + 1], high):.6g}, but every partial sum from eta_0 on must be positive"
             for j in self._pieces(low, high)
             if not self.piece_slopes[j] > 0.0
         ]

@@ -1,10 +1,10 @@
 """tanh and atanh with the bits of the C kernels `c_runtime/front/{tanh,atanh}_{f32,f64}.c`.
 
-The same operations in the same order on numbers of the same format, for float32 and float64 alike: every constant comes
-from a table of the format, because a Python float next to a float32 would widen it once numba compiles the function.
-They run on numpy scalars (`tanh.py_func`), and unchanged when compiled; on Python floats too, with the tables of
-`SCALAR`, which is several times as fast. The method is described in the comments of the
-C files; the numbers come from `c_runtime/front/fit_coefficients.py`.
+They do the same operations in the same order on numbers of the same format, float32 or float64. Every constant comes
+from a table in that format, because a Python float next to a float32 would widen it once numba compiles the function.
+They run unchanged on numpy scalars (`tanh.py_func`), compiled, and, with the tables of `SCALAR`, on Python floats,
+which is several times as fast as on numpy scalars. Comments in the C files describe the method; the coefficients come
+from `c_runtime/front/fit_coefficients.py`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = [
 
 Reals = NumberArray
 
-#: Worst error of `tanh` and `atanh` in ulp of the true value: float32 over all arguments, float64 a bound.
+#: Largest error of `tanh` and `atanh` in ulp of the true value: float32 measured over all arguments, float64 a bound.
 TANH_MAX_ULP = {"float32": 0.78, "float64": 0.86}
 ATANH_MAX_ULP = {"float32": 1.07, "float64": 1.48}
 
@@ -39,7 +39,7 @@ ATANH_MAX_ULP = {"float32": 1.07, "float64": 1.48}
 class TanhTables(NamedTuple):
     """Constants of `tanh` in one format, one-dimensional arrays of it."""
 
-    bound: Reals  # tanh x is x below the first, 1 from the second
+    bound: Reals  # tanh x is x below the first, 1 from the second on
     one: Reals
     odd: Reals  # coefficients of P in x + x z P(z), z = x^2
     knot: Reals  # where the pieces begin
@@ -50,14 +50,14 @@ class TanhTables(NamedTuple):
 class AtanhTables(NamedTuple):
     """Constants of `atanh` in one format, one-dimensional arrays of it."""
 
-    bound: Reals  # 1/2 and the last number below 1
+    bound: Reals  # 1/2 and the largest number below 1
     one: Reals
     half_log2: Reals
     odd: Reals  # coefficients of P in x + x z P(z), z = x^2
     center: Reals  # where the pieces of log(m)/2, 1 <= m < 2, are expanded
     offset: Reals  # center - 1, for the upper half of the pieces
     row: Reals  # their coefficients from degree 0, piece after piece
-    power: Reals  # 2^0, 2^1, .. up to the significand's bits
+    power: Reals  # 2^0, 2^1, .. up to the number of bits of the significand
     number: Reals  # 0, 1, .. likewise
 
 
@@ -66,7 +66,7 @@ def tanh(x: Scalar, t: TanhTables) -> Scalar:
     """Hyperbolic tangent of one number, with the bits of `hystgen_tanh`.
 
     `x`: numpy scalar of the tables' format, no unit; returns the same format. Infinities give +-1, NaN gives 1;
-    raises nothing. Worst error: `TANH_MAX_ULP`.
+    raises nothing. Largest error: `TANH_MAX_ULP`.
     """
     a = -x if x < 0 else x
     if a < t.bound[0]:
@@ -98,8 +98,8 @@ def tanh(x: Scalar, t: TanhTables) -> Scalar:
 def atanh(x: Scalar, t: AtanhTables) -> Scalar:
     """Inverse hyperbolic tangent of one number, with the bits of `hystgen_atanh`.
 
-    `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Values outside, and NaN, are
-    taken as the last number below 1; raises nothing. Worst error: `ATANH_MAX_ULP`.
+    `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Larger |x| and NaN are treated
+    as the largest number below 1; raises nothing. Largest error: `ATANH_MAX_ULP`.
     """
     a = -x if x < 0 else x
     if a <= t.bound[0]:
@@ -287,4 +287,4 @@ ATANH_TABLES = {"float32": _ATANH_FLOAT32, "float64": _ATANH_FLOAT64}
 """Constants of `atanh` in each format; read-only arrays."""
 
 SCALAR = TanhTables(*(x.tolist() for x in _TANH_FLOAT64)), AtanhTables(*(x.tolist() for x in _ATANH_FLOAT64))
-"""Constants of both in float64 as Python floats, which compute the same bits as numpy's scalars."""
+"""Float64 constants of both as Python floats, which give the same bits as numpy scalars."""

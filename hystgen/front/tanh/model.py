@@ -41,7 +41,7 @@ class TanhEnvelope:
         for name, value in (("ascending", self.ascending), ("descending", self.descending or self.ascending)):
             branch = finite_numbers(value, f"the {name} branch's a0 .. a3")
             if len(branch) != 4 or not branch[0] * branch[1] > 0.0:
-                raise ValueError(f"the {name} branch has four numbers a0 .. a3 with a0 a1 > 0")
+                raise ValueError(f"the {name} branch needs four numbers a0 .. a3 with a0 a1 > 0")
             object.__setattr__(self, name, branch)
 
     @property
@@ -63,8 +63,8 @@ class TanhEnvelope:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x at which the branch is y (58); values that the branch never reaches are replaced by its last reachable
-        ones."""
+        """The x at which the branch has the value y (58); a y that the branch never reaches is replaced by the nearest
+        value that it does reach."""
         a0, a1, a2, a3 = self.branch(ascending)
         edge = float(np.nextafter(1.0, 0.0))
         if isinstance(y, float):
@@ -73,11 +73,11 @@ class TanhEnvelope:
         return np.asarray((np.arctanh(arguments) - a2) / a1)
 
     def image(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
-        """Values at the ends: the branch rises everywhere."""
+        """Values at the ends, since the branch rises everywhere."""
         return float(self.forward(float(low), ascending)), float(self.forward(float(high), ascending))
 
     def slope_range(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
-        """`a0 a1 / cosh(a1 x + a2)^2` is largest where the argument is nearest to zero."""
+        """Extremes of `a0 a1 / cosh(a1 x + a2)^2`, which is largest where the argument is nearest to zero."""
         a0, a1, a2, _ = self.branch(ascending)
         ends = sorted((a1 * low + a2, a1 * high + a2))
         nearest = min(max(0.0, ends[0]), ends[1])
@@ -89,7 +89,7 @@ class TanhEnvelope:
         return min(slope(ends[0]), slope(ends[1])), slope(nearest)
 
     def inverse_problems(self, low: float, high: float) -> list[str]:
-        """Slopes that vanish in double precision: the envelope is flat to rounding over the range."""
+        """Branches whose slope vanishes in double precision somewhere in the range."""
         return [
             f"the {'ascending' if up else 'descending'} envelope is flat to double precision within "
             f"{low:.6g} to {high:.6g}; narrow input_range"

@@ -13,20 +13,20 @@ from hystgen.plays.corners.corners_float import PlaceState
 from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
 from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepState
 
-INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
+INPUT_MOST = 2**31 - 1  # inputs of the plays, in their smallest steps, are an int32_t in C
 
 Kink = tuple[int, int, int, int]
-"""`hystgen_kink_t`: output and input along the present move, plays that follow from there on, corners that hold
-the others."""
+"""`hystgen_kink_t`: output and input along the present move, the number of plays that follow from here on, and of
+corners that hold the others."""
 
 FAR = 1 << 62
-"""Beyond every sum of plays: those have fewer than 62 bits."""
+"""Larger than any sum of plays, which have fewer than 62 bits."""
 
 
 class FixedCorner(Struct):
     """A turning point. It holds the plays of its block: those above the plays of the next corner, up to play `top`."""
 
-    output: Int64  # at the turning point, which C has in two parts
+    output: Int64  # at the turning point; in C, in two parts
     input: Int32
     top: Count
     rose: Flag  # whether a rising move ended here, or a falling one
@@ -42,14 +42,14 @@ class FixedMemory(NamedTuple):
 
 
 def new_fixed_memory(plays: int, dtype: DTypeLike = np.int64) -> FixedMemory:
-    """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
+    """Memory for one instance of a model with this many plays besides play 0; `init` sets its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return FixedMemory(here, undo, StepState.zeros(1, dtype), FixedCorner.zeros(max(plays, 1), dtype))
 
 
 @jit(inline=True)
 def along(m: FixedMemory, x: int) -> int:
-    """x as seen along the present move: a falling move is a rising one with all signs changed."""
+    """x along the present move: a falling move is treated as a rising one with all signs changed."""
     return x if m.here.rising[0] else -x
 
 
@@ -74,7 +74,7 @@ def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) 
 
 @jit
 def turn_back(m: FixedMemory) -> None:
-    """Turn back: a corner stays where plays have followed."""
+    """Turn back, leaving a corner if plays have followed."""
     if m.here.k[0] > 0:
         leave_corner(m)
         m.here.k[0] = 0
@@ -83,7 +83,7 @@ def turn_back(m: FixedMemory) -> None:
 
 @jit
 def find(t: FixedPlayTables, m: FixedMemory, to: int, by_output: bool) -> Kink:
-    """The last kink before `to`, an output or input along the move: where another play begins to follow, or here."""
+    """The last kink before `to`, an output or input along the move; the present point if no play begins to follow."""
     c = -1
     low = 0
     left = m.here.depth[0]
@@ -116,7 +116,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: int, by_output: bool) -> Kink:
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: int) -> Kink:
-    """The same for any move to an input. May turn back, but moves nothing."""
+    """As `find`, for a move to any input. May turn back, but moves nothing."""
     if along(m, to - m.here.input[0]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)
@@ -124,7 +124,7 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: int) -> Kink:
 
 @jit
 def go_on(m: FixedMemory, kink: Kink, to: int, moved: int) -> None:
-    """Move the plays to an input short of the next kink; `moved` is the output since the last one."""
+    """Move the plays to an input short of the next kink; `moved` is the output gained since `kink`."""
     m.here.output[0] = along(m, kink[0] + moved)
     m.here.input[0] = to
     m.here.k[0] = kink[2]
@@ -170,7 +170,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: int) -> int:
 
 @jit
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
-    """The input, at most a little outside the range, that gives `to`, an output beyond a kink along the move."""
+    """The input that gives `to`, an output beyond a kink along the move; at most slightly outside the range."""
     x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.here.rising[0] else t.limits[MARGIN] - t.limits[PLAY_MIN]
     return along(m, most if x > most else x)
@@ -178,9 +178,9 @@ def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
 
 @jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: int, following: int) -> tuple[int, Kink]:
-    """The input for `output`, at most a little outside the range, and the kink from which it is counted.
+    """The input for `output`, at most slightly outside the range, and the kink from which it is counted.
 
-    May turn back, but moves nothing. The same plays are known to follow up to the output `following`, along the move.
+    May turn back, but moves nothing. Up to the output `following`, along the move, no other play begins to follow.
     """
     if along(m, output - m.here.output[0]) < 0:
         turn_back(m)
@@ -205,7 +205,7 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) ->
     another play begins to follow."""
     following = next_output(t, m, kink)
     moved = gained(t, m, kink, to)
-    if moved < 0 or kink[0] + moved > following:  # by rounding, or it was limited
+    if moved < 0 or kink[0] + moved > following:  # because of rounding or limiting
         kink = find_input(t, m, to)
         following = next_output(t, m, kink)
         moved = gained(t, m, kink, to)
@@ -215,8 +215,8 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) ->
 
 @jit
 def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
-    """Start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to where it
-    begins to follow."""
+    """Set a start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to the
+    input at which that play begins to follow."""
     aside = t.limits[OFFSET]
     m.here.depth[0] = 0
     for k in range(len(t.threshold) - 1, 0, -1):

@@ -10,7 +10,7 @@ from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, TwoReals
 from hystgen.plays.slots import Reals, StepState
 
-BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
+BOTTOM = 2  # `rose` of the bottom, which is the opposite of both directions
 
 
 class Literals(Struct):
@@ -25,12 +25,12 @@ class Literals(Struct):
 class Curve(NamedTuple):
     """`hystgen_curve_t`: one operator; [0] is for falling moves, with signs changed, [1] for rising ones."""
 
-    way: Reals  # (n + 2): play k begins to follow when a move has come this far
-    reach: Reals  # (n + 2): the same in output
+    way: Reals  # (n + 2): distance along a move at which play k begins to follow
+    reach: Reals  # (n + 2): the same in output units
     gain: Reals  # (n + 2)
     slope: Reals  # (n + 2): 1 / gain
     limit: Reals  # (2): of the output
-    inside: Reals  # (2): outputs up to here stay within the limit whatever rounding does
+    inside: Reals  # (2): outputs up to here stay within the limit however they are rounded
     range: Reals  # (2): of the input
     literal: Literals
 
@@ -39,14 +39,14 @@ class Start(NamedTuple):
     """`hystgen_start_t`: a start memory."""
 
     center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold play k's value
-    step: int  # 0: one for all plays, 1: one for each
-    risen: int  # plays up to this one are left by rising moves, the others by falling ones
+    step: int  # 0: one centre for all plays, 1: one for each
+    risen: int  # rising moves left the corners of plays up to this one, falling moves the others
     bottom: Reals  # output, and the inputs at which a falling and a rising move passed it
     top: int  # plays from here on cannot move within the range
 
 
 class PlaceState(Struct):
-    """Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others."""
+    """The plays' present position: plays 0 .. k follow the present move, `depth` corners hold the others."""
 
     input: Real  # of the play sum (forward: drive, inverse: output)
     output: Real
@@ -59,28 +59,28 @@ class PlaysState(Struct):
     """The line that the next outputs of the play sum lie on."""
 
     next: Real  # input up to which the same plays follow and nothing is limited
-    cap: Real  # input up to which the same corner counts and nothing is limited
+    cap: Real  # input up to which the same corner applies and nothing is limited
     behind: Real  # while no play follows: the same as `next`, on the other side
-    from_input: Real  # input and output that the top corner's block counts from
+    from_input: Real  # input and output from which the top corner's block is counted
     from_output: Real
     begin: Real  # output = start + (input - begin) gain
     start: Real
     gain: Real
     sign: Real  # 1 for rising, -1 for falling
-    limited: Flag  # the output is a limit and the input may lie beyond what gives it
+    limited: Flag  # the output is at a limit, and the input may lie beyond the one that first reaches it
 
 
 class Corner(Struct):
     """A turning point. It holds the plays of its block: those above the plays of the next corner, up to play `top`."""
 
     output: Real  # at the turning point
-    passed: TwoReals  # input at which a falling and a rising move have passed it, along the move
+    passed: TwoReals  # inputs, along the move, at which a falling and a rising move pass it
     top: Count
     rose: SmallCount  # direction of the move that ended here, or `BOTTOM`
 
 
 class Memory(NamedTuple):
-    """One instance; `undo`: where the plays were before the last step."""
+    """One instance; `undo`: the plays' position before the last step."""
 
     here: PlaceState
     undo: PlaceState
@@ -90,14 +90,14 @@ class Memory(NamedTuple):
 
 
 def new_memory(plays: int, dtype: DTypeLike) -> Memory:
-    """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
+    """Memory for one instance of a model with this many plays besides play 0; `init` sets its values."""
     here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return Memory(here, undo, PlaysState.zeros(1, dtype), StepState.zeros(1, dtype), Corner.zeros(plays + 1, dtype))
 
 
 @jit
 def copy_place(to: PlaceState, source: PlaceState) -> None:
-    """Copy a place field by field."""
+    """Copy a position field by field."""
     to.input[0] = source.input[0]
     to.output[0] = source.output[0]
     to.k[0] = source.k[0]
@@ -107,13 +107,13 @@ def copy_place(to: PlaceState, source: PlaceState) -> None:
 
 @jit(inline=True)
 def along(m: Memory, x: Scalar) -> Scalar:
-    """x as seen along the present move: a falling move is a rising one with all signs changed."""
+    """x along the present move: a falling move is treated as a rising one with all signs changed."""
     return m.plays.sign[0] * x
 
 
 @jit(inline=True)
 def forget_line(m: Memory) -> None:
-    """Forget the line of the last outputs: the next sample searches."""
+    """Forget the line of the last outputs, so that the next sample searches."""
     m.plays.next[0] = m.here.input[0]
     m.plays.cap[0] = m.here.input[0]
     m.plays.behind[0] = m.here.input[0]
@@ -129,7 +129,7 @@ def take_back(t: Curve, m: Memory) -> None:
 
 @jit
 def leave_corner(t: Curve, m: Memory) -> None:
-    """Leave a corner here. A block whose last play follows only beyond the limit is never passed."""
+    """Leave a corner here. A block whose last play would begin to follow only beyond the limit is never passed."""
     rising = m.here.rising[0]
     k = m.here.k[0]
     c = m.here.depth[0]
@@ -145,7 +145,7 @@ def leave_corner(t: Curve, m: Memory) -> None:
 
 @jit
 def turn_back(t: Curve, m: Memory) -> None:
-    """Turn back: a corner stays where plays have followed."""
+    """Turn back, leaving a corner if plays have followed."""
     if m.here.k[0] > 0:
         leave_corner(t, m)
         m.here.k[0] = 0
@@ -156,7 +156,7 @@ def turn_back(t: Curve, m: Memory) -> None:
 
 @jit
 def find_segment(step: Reals, k: int, end: int, way: Scalar) -> int:
-    """The last of segments k .. end - 1 that begins before `way`; segment k does. `step`: all ways, or all reaches."""
+    """The last of segments k .. end - 1 that begins before `way`, as segment k does. `step`: `way` or `reach`."""
     middle = (k + end) // 2
     while middle > k:
         if way > step[middle]:
@@ -188,7 +188,7 @@ def stop_in_block(t: Curve, m: Memory, output: Scalar, to: Scalar) -> None:
 
 @jit
 def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
-    """Move the plays to where their sum is `output`, up to rounding."""
+    """Move the plays until their sum is `output`, up to rounding."""
     if along(m, output) < along(m, m.here.output[0]):
         turn_back(t, m)
     rising = m.here.rising[0]
@@ -207,7 +207,7 @@ def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
 
 @jit
 def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
-    """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
+    """Move the plays to any input. False if the limit comes first; the caller then stops them there."""
     if along(m, to) < along(m, m.here.input[0]):
         turn_back(t, m)
     x = along(m, to)
@@ -265,7 +265,7 @@ def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
 
 @jit
 def move_in_block(t: Curve, m: Memory, to: Scalar) -> bool:
-    """Move on to an input short of CAP: more plays of the block follow. False if a search would be faster."""
+    """Move on to an input short of `cap`, where more plays of the block follow. False if a search would be faster."""
     way = along(m, to - m.plays.from_input[0])
     k = m.here.k[0] + 1
     many = m.here.k[0] + 8
@@ -306,7 +306,7 @@ def plays_step(t: Curve, m: Memory, to: Scalar) -> Scalar:
 
 @jit
 def start(t: Curve, m: Memory, s: Start) -> None:
-    """Start memory. Each play is a block of its own."""
+    """Set a start memory. Each play is a block of its own."""
     m.corner.output[0] = s.bottom[0]
     m.corner.passed[0, 0] = s.bottom[1]
     m.corner.passed[0, 1] = s.bottom[2]
