@@ -399,7 +399,7 @@ BAD_PYTHON = {
     "named number": (SOLVED, "    return RATE + product", f":24: the number RATE in solve {PRECISE}"),
     "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":24: solve has np.abs(s[0]); write it"),
     "times": (SOLVED, "    return s[0] * s[0] + product", ":24: solve has s[0] * s[0]; write it with +, -, product"),
-    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a table entry first"),
+    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a table entry"),
     "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, so it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),

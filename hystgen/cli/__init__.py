@@ -18,11 +18,18 @@ stay: with Python's 700, `hystgen emit` of a plain model spends 22 of 1,526 mill
 again and again (callgrind, Python 3.11)."""
 
 
+COMMANDS = ("emit", "verify", "simulate", "identify", "diagnose", "track", "show", "schema")
+"""Each in the module of its name."""
+
+
 class _Commands(console.Commands):
-    """Commands that are imported when they are asked for, each from the module of its name."""
+    """Commands that are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  for all groups
+        return sorted(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002  for all groups
-        if cmd_name not in self.commands:
+        if cmd_name not in COMMANDS:
             return None
         found: click.Command = getattr(importlib.import_module(f"hystgen.cli.{cmd_name}"), cmd_name)
         return found
@@ -38,7 +45,3 @@ def main() -> None:
     atexit.register(gc.freeze)  # or the last search takes 62 of 1,486 million, for memory that the process returns
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would search every installed distribution
     jit.announce = console.note
-
-
-for name in ("emit", "verify", "simulate", "identify", "diagnose", "track", "show", "schema"):
-    main.add_command(click.Command(name))
