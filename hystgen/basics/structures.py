@@ -120,6 +120,11 @@ def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
     return type(name, (Struct,), {"__annotations__": dict.fromkeys(members, word)})
 
 
+def firsts(lengths: Iterable[int]) -> NumberArray:
+    """Where lists of these lengths begin when stored one after another, and where the last one ends."""
+    return np.cumsum([0, *lengths]).astype(np.int64)
+
+
 def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
     """Return a function that makes the memory of blocks, all 0, from their tables and the type of `Real`.
 

@@ -70,7 +70,7 @@ def unbounded(one: EmittedModel) -> list[str]:
         return []
     unit = one.form.unit(one.units.drive)
     said = (
-        f"Error: no bound of {one.names.NAME}_INVERSE is known; the largest error found in {found.samples} samples is "
+        f"Error: no bound of the inverse's error is known; the largest found in {found.samples} samples is "
         f"{found.error:.2g}{unit}"
     )
     rounding = float(one.numbers.errors.rounding)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,11 +53,6 @@ class StepState(Struct):
     sought: Flag  # a solution has been found since the plays last followed
     bits: UInt32  # status of the last answer
     status: UInt32
-
-
-def firsts(lengths: Iterable[int]) -> Counts:
-    """Where lists of these lengths begin when stored one after another, and where the last one ends."""
-    return np.cumsum([0, *lengths]).astype(np.int64)
 
 
 @jit(inline=True)

@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from hystgen.basics.jit import Answer, Scalar, jit
+from hystgen.basics.structures import firsts
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants, OwnBlock
 from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
-from hystgen.plays.slots import Counts, Reals, firsts
+from hystgen.plays.slots import Counts, Reals
 
 Glue = tuple[Answer, Answer, Answer]
 """The functions that connect an arithmetic to blocks: product, and conversions of a signal into a block and back."""

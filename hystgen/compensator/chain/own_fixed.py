@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Factor, Struct, UInt8
+from hystgen.basics.structures import Factor, Struct, UInt8, firsts
 from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
@@ -25,7 +25,6 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.own import Instance
 from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import firsts
 
 Row = tuple[tuple[int, int], int, int]
 """The members of a `FixedNumber`."""

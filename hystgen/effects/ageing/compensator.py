@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import Action, Answer, Check, Scalar, jit
-from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, memory_of
+from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, firsts, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 

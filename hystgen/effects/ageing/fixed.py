@@ -9,7 +9,7 @@ from typing import NamedTuple
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8
+from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8, firsts
 from hystgen.effects.ageing import compensator as floating
 from hystgen.effects.ageing.compensator import Aged, AgeingPiece, piece_at
 from hystgen.effects.gains import (
@@ -26,7 +26,7 @@ from hystgen.effects.gains import (
 )
 from hystgen.effects.kinds import Rows, numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 SHARE_BITS = 20
 """Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import Answer, Scalar, jit
-from hystgen.basics.structures import Count, Real, Struct, memory_of
+from hystgen.basics.structures import Count, Real, Struct, firsts, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:

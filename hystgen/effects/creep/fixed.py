@@ -17,12 +17,12 @@ import numpy as np
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, memory_of
+from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.kinds import Kind, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 
 class FixedCreepTerm(Struct):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import N, Scalar, jit
-from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
+from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, firsts, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows, numbered
@@ -29,7 +29,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 # ---------------------------------------------------------------- gain.c
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, memory_of
+from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.gains import (
     GAIN_BITS,
     LARGEST,
@@ -37,7 +37,7 @@ from hystgen.effects.thermal.compensator import (
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, firsts, zero
+from hystgen.plays.slots import Counts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain that is linear in a temperature: one product."""
