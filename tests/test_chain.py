@@ -859,7 +859,8 @@ def test_what_shapes_says_how_late_it_is(by: str) -> None:
     how = one.parameters.emit.compensation
     numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
     text = module.files(module.of(one.parameters, one.cascade, emit_options(one)))["straight.h"].replace("\n * ", " ")
-    found = re.search(r"the motion ([0-9.]+) samples late, and a sine with 200 samples .* by ([0-9.]+) %", text)
+    form = r"the motion ([0-9.]+) samples late, and the error of a sine at 200 samples .* is ([0-9.]+) %"
+    found = re.search(form, text)
     assert found
     assert "which is" in text
     k = np.arange(900)

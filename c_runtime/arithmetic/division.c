@@ -37,7 +37,7 @@ static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
     unsigned int bits;
     for (bits = HYSTGEN_WORD; bits > 0; bits /= 2u) {
         if (x >> (2u * HYSTGEN_WORD - 1u - bits) == 0) {
-            x = (x & (UINT64_MAX >> bits)) << bits;
+            x = (x & (~(uint64_t)0 >> bits)) << bits;
             raised |= bits;
         }
     }
