@@ -125,8 +125,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow, forward", FLOAT,
-        "    } else if (m->here.k == 0) {\n        same =",
-        "    } else {\n        same =",
+        ": m->here.k == 0 && (m->here.rising ? input > m->behind",
+        ": (m->here.rising ? input > m->behind",
         "plain", "float32",
     ),
     Mutant(
