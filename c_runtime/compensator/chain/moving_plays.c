@@ -152,6 +152,7 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return self->level;
 }
 
+#ifdef HYSTGEN_INVERSE
 #ifdef HYSTGEN_FIXED
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
@@ -227,6 +228,7 @@ static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_
     self->search.slope = slope;
     return sum;
 }
+#endif
 #endif
 
 #endif
