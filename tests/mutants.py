@@ -107,8 +107,8 @@ KILLED = (
     ),
     Mutant(
         "a step back by rounding goes on", FLOAT,
-        "    if (back) {\n        cap = x;\n    } else if (t->range[on] < cap) {",
-        "    if (t->range[on] < cap) {",
+        "    cap = back ? x : end;\n",
+        "    cap = end;\n",
         "listed", "float32",
     ),
     Mutant(
@@ -125,8 +125,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow, forward", FLOAT,
-        ": m->here.k == 0 && (m->here.rising ? input > m->behind",
-        ": (m->here.rising ? input > m->behind",
+        "    if (near && (on || m->here.k == 0)) {",
+        "    if (near) {",
         "plain", "float32",
     ),
     Mutant(

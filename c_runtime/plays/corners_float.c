@@ -175,11 +175,8 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     }
     const bool back = hystgen_along(m, output) < hystgen_along(m, m->here.output); /* by rounding */
     m->here.output = back ? m->here.output : output;
-    if (back) {
-        cap = x;
-    } else if (t->range[on] < cap) {
-        cap = t->range[on];
-    }
+    const hystgen_real_t end = t->range[on] < cap ? t->range[on] : cap;
+    cap = back ? x : end;
     m->cap = hystgen_along(m, cap);
     m->next = hystgen_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -216,13 +213,13 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                               hystgen_corner_t *corner, hystgen_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    if (on ? (m->here.rising ? input < m->next : input > m->next)
-           : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+    const hystgen_real_t end = on ? m->next : m->behind; /* of the line, in this direction */
+    const bool near = on == m->here.rising ? input < end : input > end;
+    if (near && (on || m->here.k == 0)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
-    } else if (on ? (m->here.rising ? input >= m->cap : input <= m->cap) ||
-                        !hystgen_move_in_block(t, m, input)
-                  : (m->here.rising ? input < m->here.input : input > m->here.input)) {
+    } else if (on ? hystgen_along(m, input - m->cap) >= 0 || !hystgen_move_in_block(t, m, input)
+                  : hystgen_along(m, input - m->here.input) < 0) {
         (void)hystgen_move_to_input(t, m, corner, input);
     }
     return m->here.output;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 933e437b19beba55aaf52fd70b16a39dcc62d8b6e696522872ce5d415bfb5695, without this line
+ * Text: sha256 2d32c4645aa49532a02dff77fb1eb5f395415a2824dc28e06553417316452bd3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -243,11 +243,8 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     }
     const bool back = plain_along(m, output) < plain_along(m, m->here.output); /* by rounding */
     m->here.output = back ? m->here.output : output;
-    if (back) {
-        cap = x;
-    } else if (t->range[on] < cap) {
-        cap = t->range[on];
-    }
+    const plain_real_t end = t->range[on] < cap ? t->range[on] : cap;
+    cap = back ? x : end;
     m->cap = plain_along(m, cap);
     m->next = plain_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 87014f843b327c29de853762bc803d0c9dc8213d9b0086a2c30860619b2afb49, without this line
+ * Text: sha256 5a7ffddb10841ef26b7fbfe52048589545710b6ae79db177e2330541da72e6f9, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -639,11 +639,8 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     /* by rounding */
     const bool back = two_branches_along(m, output) < two_branches_along(m, m->here.output);
     m->here.output = back ? m->here.output : output;
-    if (back) {
-        cap = x;
-    } else if (t->range[on] < cap) {
-        cap = t->range[on];
-    }
+    const two_branches_real_t end = t->range[on] < cap ? t->range[on] : cap;
+    cap = back ? x : end;
     m->cap = two_branches_along(m, cap);
     m->next = two_branches_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -680,14 +677,15 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    if (on ? (m->here.rising ? input < m->next : input > m->next)
-            : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+    const two_branches_real_t end = on ? m->next : m->behind; /* of the line, in this direction */
+    const bool near = on == m->here.rising ? input < end : input > end;
+    if (near && (on || m->here.k == 0)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
     } else if (on
-            ? (m->here.rising ? input >= m->cap : input <= m->cap) ||
+            ? two_branches_along(m, input - m->cap) >= 0 ||
                 !two_branches_move_in_block(t, m, input)
-            : (m->here.rising ? input < m->here.input : input > m->here.input)) {
+            : two_branches_along(m, input - m->here.input) < 0) {
         (void)two_branches_move_to_input(t, m, corner, input);
     }
     return m->here.output;
