@@ -240,13 +240,13 @@ C_RUNTIME = PACKAGE.parent / "c_runtime"
 BOUNDS = {
     "lines of hystgen/": (54_250, 38_000),
     "lines that ask `.fixed`": (14, 10),
-    "lines with `Any`": (287, 300),
+    "lines with `Any`": (273, 300),
     "`fmt: skip`": (1, 30),
     "tuples of numbered slots": (31, 0),
     "files that name an effect outside its folder": (2, 0),
     "class names in several files": (2, 0),
     "files of C": (99, 120),
-    "lines of C": (7_201, 5_000),
+    "lines of C": (7_200, 5_000),
 }
 """Largest number of each today, and the target. A change that gets below the first lowers it; nothing raises it."""
 
