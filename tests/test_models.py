@@ -304,9 +304,9 @@ def test_a_smooth_loading_curve_gives_the_density_back() -> None:
     [
         ([0], [0], "as many values as points, at least two"),
         ([0, 1], [0, 1, 2], "as many values as points, at least two"),
-        ([0.5, 1], [0, 1], r"starts at \(0, 0\)"),
-        ([0, 1], [0.5, 1], r"starts at \(0, 0\)"),
-        ([0, 1, 1], [0, 1, 2], "rise strictly"),
+        ([0.5, 1], [0, 1], r"start at \(0, 0\)"),
+        ([0, 1], [0.5, 1], r"start at \(0, 0\)"),
+        ([0, 1, 1], [0, 1, 2], "strictly rising"),
         ([0, float("nan"), 1], [0, 1, 2], "give x as finite numbers"),
         ([0, 1, float("inf")], [0, 1, 2], "give x as finite numbers"),
         ([0, 1], [0, float("nan")], "give phi as finite numbers"),
