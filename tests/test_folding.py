@@ -212,6 +212,7 @@ def called(functions: dict[str, object], root: str) -> set[str]:
 HEAD = "int hystgen_f(hystgen_inverse_t *self, int x) {\n"
 ITSELF = "static int hystgen_g(int v) {\n    return v;\n}\n"
 DOUBLE = "static int hystgen_g(int v) {\n    return v + v;\n}\n"
+MOVED = "static int hystgen_g(int *play) {\n    play[0] = 1;\n    return 1;\n}\n"
 TRUE = "static bool hystgen_g(int v) {\n    (void)v;\n    return true;\n}\n"
 
 
@@ -235,10 +236,12 @@ TRUE = "static bool hystgen_g(int v) {\n    (void)v;\n    return true;\n}\n"
         (DOUBLE, ["self->last = x;", "return hystgen_g(x);"], "{ return hystgen_g(x); }"),
         (DOUBLE, ["self->last = self->last + x;", "return self->last;"], None),
         (DOUBLE, ["self->last = hystgen_h(self, x);", "return hystgen_g(x);"], None),
+        (DOUBLE, ["const int y = hystgen_g(x);", "return x;"], "{ return x; }"),
+        (MOVED, ["const int y = hystgen_g(play);", "return play[0];"], None),  # which moves a play
     ],
 )  # fmt: skip
 def test_what_is_folded(hook: str, lines: list[str], wanted: str | None) -> None:
     body = "".join(f"    {line}\n" for line in lines)
-    head = HEAD if "self" in body else HEAD.replace("hystgen_inverse_t *self, ", "")
+    head = HEAD if "self" in body else HEAD.replace("hystgen_inverse_t *self, ", "int *play, " * ("play" in body))
     before, after = " ".join((head + body + "}").split()), fold(hook, f"{head}{body}}}\n")
     assert (wanted or before) in after

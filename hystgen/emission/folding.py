@@ -163,7 +163,7 @@ class _Folding:
             used = _MARK.sub("", function.body)
             kept = [bool(re.search(rf"(?<![.>])\b{each}\b", used)) for each in function.names]
             for place, keep in enumerate(kept):
-                kept[place] = keep or not all(_pure(arguments[place]) for arguments in self._given(name))
+                kept[place] = keep or not all(self._looks(arguments[place]) for arguments in self._given(name))
             if not function.own or all(kept):
                 continue
             gone = [each for each, keep in zip(function.names, kept, strict=True) if not keep]
@@ -262,7 +262,7 @@ class _Folding:
                 if uses == body.count(f"if ({found[1]}) {{"):  # never set
                     body = body.replace(found[0], "").replace(f"if ({found[1]}) {{", "if (false) {")
             for local in _UNUSED.finditer(body):
-                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", body)) == 1 and _pure(local[2]):
+                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", body)) == 1 and self._looks(local[2]):
                     body = body.replace(local[0], "")
             body = re.sub(r"\b(\w+) < \1 \|\| \1 > \1", "false", body)
             body = body.replace("!true", "false").replace("!false", "true")
@@ -322,11 +322,6 @@ def _declared(function: Function) -> dict[str, str]:
 _ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"
 """A field that is a condition by itself."""
 _STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
-
-
-def _pure(expression: str) -> bool:
-    """Whether an expression changes nothing: no call in it is given a pointer to memory."""
-    return not re.search(r"\([^()]*(?:\bself\b(?!->)|&)", expression)
 
 
 def _unmarked(body: str, gone: Collection[str]) -> str:
