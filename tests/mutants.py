@@ -125,8 +125,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow, forward", FLOAT,
-        "    if (near && (on || m->here.k == 0)) {",
-        "    if (near) {",
+        "    if (within && (on || m->here.k == 0)) {",
+        "    if (within) {",
         "plain", "float32",
     ),
     Mutant(

@@ -214,8 +214,8 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
                                               hystgen_corner_t *corner, hystgen_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
     const hystgen_real_t end = on ? m->next : m->behind; /* of the line, in this direction */
-    const bool near = on == m->here.rising ? input < end : input > end;
-    if (near && (on || m->here.k == 0)) {
+    const bool within = on == m->here.rising ? input < end : input > end;
+    if (within && (on || m->here.k == 0)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
     } else if (on ? hystgen_along(m, input - m->cap) >= 0 || !hystgen_move_in_block(t, m, input)

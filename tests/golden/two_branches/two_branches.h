@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 5a7ffddb10841ef26b7fbfe52048589545710b6ae79db177e2330541da72e6f9, without this line
+ * Text: sha256 569918285a1ef6a0d7fa99f381f8fddd1b1a47f22a4ef60d966d40c84d8f0790, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -678,8 +678,8 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
     const two_branches_real_t end = on ? m->next : m->behind; /* of the line, in this direction */
-    const bool near = on == m->here.rising ? input < end : input > end;
-    if (near && (on || m->here.k == 0)) {
+    const bool within = on == m->here.rising ? input < end : input > end;
+    if (within && (on || m->here.k == 0)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
     } else if (on
