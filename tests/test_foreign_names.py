@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from foreign_names import NAMES, words
-from modelfiles import FILES
+from modelfiles import BRAKED, CHAINS, FILES
 
 import hystgen
 from hystgen.emission.calls import emitted_files
@@ -53,7 +53,7 @@ HEADERS: dict[str, tuple[Sequence[str], str, bool]] = {  # compiler, what it inc
 
 
 def model(name: str) -> Model:
-    return Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    return Model(parse_parameters({**FILES, **CHAINS, "braked": BRAKED}[name], f"{name}.yaml"))
 
 
 def identifiers(text: str, own: str) -> set[str]:
@@ -66,6 +66,10 @@ def identifiers(text: str, own: str) -> set[str]:
     return {word for word in found - KEYWORDS if not word.lower().startswith((f"{own}_", "hystgen_"))}
 
 
+EFFECTS = ("braked", "lagging", "soft_dashpot", "dilated", "viscous", "rubbed", "heated", "worn", "drifting", "late")
+"""Models that have all effects between them."""
+
+
 @functools.cache
 def emitted() -> frozenset[str]:
     """The identifiers of every kind of model, arithmetic, engine and layout."""
@@ -75,6 +79,9 @@ def emitted() -> frozenset[str]:
     for name, arithmetic, engine, layout in itertools.product(kinds, ARITHMETICS, ("corners", "loop"), layouts):
         options = {"operator": "both", "arithmetic": arithmetic, "engine": engine, "layout": layout}
         for text in emitted_files(model(name), **options).values():
+            found |= identifiers(text, name)
+    for name, arithmetic in itertools.product(EFFECTS, ("float32", "q31")):
+        for text in emitted_files(model(name), arithmetic=arithmetic, engine="loop").values():
             found |= identifiers(text, name)
     return frozenset(found)
 

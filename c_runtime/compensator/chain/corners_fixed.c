@@ -15,8 +15,12 @@
 
 /* Sets all plays to their start values or, at a reset, to 0. Only their place is known then. */
 static void hystgen_operator_plays_start(hystgen_operator_t *self, bool reset) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
-                  reset ? hystgen_model_zero : hystgen_model_start, reset ? 0 : HYSTGEN_START_STEP);
+    if (reset) {
+        hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_zero, 0);
+    } else {
+        hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_start,
+                      HYSTGEN_START_STEP);
+    }
     self->kink.output = 0;
     self->kink.input = 0;
     self->kink.k = 0;

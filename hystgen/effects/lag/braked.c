@@ -60,28 +60,28 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
     return over < -room ? -room : over;
 }
 
-/* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
-   solution, `beyond` the distance between these drives. The lead is cut at most by the present and
-   the previous shortfall of the drive. A target moving by `way` in a step needs a lead of way/(1 -
-   E). */
+/* The drive from which the lag does not overshoot. `reachable` is the drive nearest to the
+   solution that the amplifier reaches, `beyond` their distance. The lead is cut at most by the
+   present and the previous shortfall of the drive. A target moving by `way` in a step needs a
+   lead of way/(1 - E). */
 HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
-                                                  const hystgen_braked_t *self, hystgen_real_t near,
-                                                  hystgen_real_t beyond) {
+                                                  const hystgen_braked_t *self,
+                                                  hystgen_real_t reachable, hystgen_real_t beyond) {
     const hystgen_lag_t *lag = &self->lag;
     const hystgen_real_t missed = self->earlier - lag->wanted;
     const hystgen_real_t room = beyond + (missed < 0 ? -missed : missed) * t->inverse_rate;
     if (!(room > 0)) {
-        return near;
+        return reachable;
     }
     const hystgen_real_t move = lag->asked - self->earlier;
     const hystgen_real_t most = move > HYSTGEN_SLEW_RISING ? HYSTGEN_SLEW_RISING : move;
     const hystgen_real_t way = most < -HYSTGEN_SLEW_FALLING ? -HYSTGEN_SLEW_FALLING : most;
     const hystgen_real_t left = (lag->asked - lag->high) + (t->theta * way - way);
-    const hystgen_real_t ahead = near - (lag->high + way * t->inverse_rate);
-    return left < 0 ? near + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,
-                                                 HYSTGEN_SLEW_RISING - way, room)
-                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead,
-                                                 HYSTGEN_SLEW_FALLING + way, room);
+    const hystgen_real_t ahead = reachable - (lag->high + way * t->inverse_rate);
+    return left < 0 ? reachable + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,
+                                                      HYSTGEN_SLEW_RISING - way, room)
+                    : reachable - hystgen_braked_over(left, left * t->inverse_rate, ahead,
+                                                      HYSTGEN_SLEW_FALLING + way, room);
 }
 
 #endif

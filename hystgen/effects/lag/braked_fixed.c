@@ -126,21 +126,21 @@ static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_b
     return over < -brake->room ? -brake->room : over;
 }
 
-/* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
-   solution, `beyond` the distance between these drives. The lead is cut at most by the present and
-   the previous shortfall of the drive. */
+/* The drive from which the lag does not overshoot. `reachable` is the drive nearest to the
+   solution that the amplifier reaches, `beyond` their distance. The lead is cut at most by the
+   present and the previous shortfall of the drive. */
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
-                                    int64_t near, int64_t beyond) {
+                                    int64_t reachable, int64_t beyond) {
     hystgen_brake_t brake;
     if (!hystgen_braked_room(t, self, &brake, beyond)) {
-        return near;
+        return reachable;
     }
     const int64_t along = hystgen_braked_led(t, hystgen_braked_along(t, self, &brake));
-    const int64_t ahead = near - hystgen_nearest(self->lag.high, t->bits) - along;
+    const int64_t ahead = reachable - hystgen_nearest(self->lag.high, t->bits) - along;
     brake.lead = hystgen_braked_coarse(brake.left < 0 ? -ahead : ahead);
     const int64_t less =
         (int64_t)hystgen_braked_over(t, &brake) * ((int64_t)1 << HYSTGEN_BRAKED_DROP);
-    return brake.left < 0 ? near + less : near - less;
+    return brake.left < 0 ? reachable + less : reachable - less;
 }
 
 #endif

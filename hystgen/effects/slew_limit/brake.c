@@ -11,12 +11,12 @@
 #include "effects/catalogue.h"
 
 /* The drive from which the lag after the amplifier does not overshoot on its way to the solution v;
-   `near` is the drive nearest to v that the amplifier reaches. */
+   `reachable` is the drive nearest to v that the amplifier reaches. */
 static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hystgen_reach_t v,
-                                              hystgen_reach_t near) {
+                                              hystgen_reach_t reachable) {
     return hystgen_drive_code(
-        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_drive_signal(near),
-                             hystgen_drive_signal(v > near ? v - near : near - v)));
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_drive_signal(reachable),
+                             hystgen_drive_signal(v > reachable ? v - reachable : reachable - v)));
 }
 
 #if defined(HYSTGEN_HAS_QUIET_DRIVE)
