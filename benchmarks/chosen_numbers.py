@@ -1,15 +1,15 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [quiet] [averages] [shifts] [branches] [noisy] [fast]
+        [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.gains.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
 `compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`; noisy: `model.MOST_GAIN` and
-`emission.doubts.NOISY`; fast: `emission.doubts.FAST`. All of them take some seconds, shifts a minute; what is random
-has fixed seeds.
+`emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`. All of them take
+some seconds, shifts a minute; what is random has fixed seeds.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ import hystgen
 from hystgen import plants
 from hystgen.chain import chain
 from hystgen.compensator import reference
-from hystgen.compensator.chain import layout, moving, noise, preview, tables
+from hystgen.compensator.chain import layout, measured, moving, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.compensator.chain.run import answers as reference_answers
+from hystgen.compensator.chained import STANDARD
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings import content
@@ -367,6 +368,21 @@ def fast() -> None:
         print(f"  {ratio:4.3g}", *(f"{each:8.2g}" for each in moved))
 
 
+def samples() -> None:
+    """The largest error found with more and more samples, as a multiple of that with the most."""
+    counts = (200, 400, 800, 3000)
+    print("samples:", *(f"{n:6}" for n in counts))
+    for effect in ("lag, time_constant: 1.0e-3", "lag, time_constant: 1.0e-2",
+                   "rate_dependence, shape: threshold, betas: [1.0e-4, 2.0e-4]"):  # fmt: skip
+        model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=f"name: {effect}"), "stage_x.yaml"))
+        for arithmetic in ("float32", "q31", "q15"):
+            compiled, found = tables.build(model.chain, arithmetic, 1e-3), []
+            for n in counts:
+                with mock.patch.object(measured, "SAMPLES", n):
+                    found.append(measured.measured(compiled, model.chain, STANDARD).error)
+            print(" ", *(f"{each / found[-1]:6.2f}" for each in found), f" {arithmetic}, {effect}")
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms of what a response changes, %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
@@ -375,7 +391,8 @@ def _lost(response: NDArray[np.complex128]) -> float:
 RUNS: dict[str, Callable[[], None]] = {
     each.__name__: each
     for each in (
-        lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches, noisy, fast
+        lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches, noisy, fast,
+        samples,
     )
 }
 

@@ -12,12 +12,6 @@ import click
 from hystgen.basics import console
 from hystgen.basics.version import __version__
 
-OBJECTS = 50_000
-"""[objects] made between two searches for garbage. Nearly all objects of a command are classes and functions, which
-stay: with Python's 700, `hystgen emit` of a plain model spends 22 of 1,526 million instructions on looking at them
-again and again (callgrind, Python 3.11)."""
-
-
 COMMANDS = ("emit", "verify", "simulate", "identify", "diagnose", "track", "show", "schema")
 """Each in the module of its name."""
 
@@ -41,7 +35,6 @@ def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen.basics import jit
 
-    gc.set_threshold(OBJECTS)
     atexit.register(gc.freeze)  # or the last search takes 62 of 1,486 million, for memory that the process returns
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would search every installed distribution
     jit.announce = console.note
