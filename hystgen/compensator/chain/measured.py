@@ -29,8 +29,8 @@ SPEEDS = (1.0, 0.3, 0.1)
 """[shares of NAME_MAX_RATE] Slow references let roundings of a lag add up, fast ones move all plays."""
 
 SAID_BY = 10.0
-"""[times the error found] A larger bound is left out, since it says nothing about the errors to expect. No run sets this;
-it is the order of magnitude within which a bound is useful."""
+"""[times the error found] A larger bound is left out, since it says nothing about the errors to expect. No run sets
+this: it is the order of magnitude within which a bound is useful."""
 
 
 @dataclass(frozen=True)
