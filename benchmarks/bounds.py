@@ -141,7 +141,7 @@ class Measured:
         found = answers(self.compiled, Run(self.t, given, extra), False).astype(float) * self.output
         exact = self.model.simulate(given * self.drive, t=self.t, extra=extra)
         if self.compiled.codes is not None:  # a gain may take the output beyond its codes
-            most = float(self.compiled.tables.limits[slots.CODE_MAX]) * self.output
+            most = float(self.compiled.tables.limits.code_max[0]) * self.output
             exact = np.clip(exact, -most, most)
         return float(np.max(np.abs(found - exact)))
 
@@ -154,10 +154,10 @@ class Measured:
         y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # also beyond what can be reached
         u = self.given(y, self.output)
         if self.compiled.codes is not None:
-            most = float(self.compiled.tables.limits[slots.CODE_MAX])
+            most = float(self.compiled.tables.limits.code_max[0])
             u = np.clip(u, -most, most)
         sent = answers(self.compiled, Run(self.t, u, extra), True).astype(float) * self.drive
-        ends = tuple(float(end) * self.drive for end in self.compiled.tables.limits[:2])
+        ends = tuple(float(end) * self.drive for end in self.compiled.tables.limits.drives)
         reached = np.clip(u * self.output, low, high)
         if self.same:
             op = np.tile(np.array([slots.OP_STEP, slots.OP_COMMIT], dtype=np.uint8), LENGTH)

@@ -31,7 +31,6 @@ from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
-from hystgen.plays import slots
 from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
@@ -94,8 +93,7 @@ def measured(
     files = sources.write(folder, one, options)
     constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
-    first = slots.OUTPUT_MIN if operator == "inverse" else slots.DRIVE_MIN
-    low, high = (float(end) for end in numbers.limits[first : first + 2])
+    low, high = map(float, numbers.limits.outputs if operator == "inverse" else numbers.limits.drives)
     u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))
     record = comparison.expected_record(numbers, real, operator == "inverse", ("sine", np.zeros(len(u), np.uint8), u))
     code, counts = {}, {}

@@ -19,7 +19,6 @@ from hystgen.effects.lag import fixed as lag
 from hystgen.effects.thermal import fixed as thermal
 from hystgen.effects.thermal.compensator import FRICTION_PLAYS
 from hystgen.model import Model
-from hystgen.plays.slots import CODE_MAX, PLAY_MAX, PLAY_MIN
 
 BEFORE = """
 #include <stdint.h>
@@ -79,7 +78,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
     tables, form = build(
         model.cascade, arithmetic, "corners", parameters.emit.drive_lsb, parameters.emit.output_lsb
     )
-    least, most = int(tables.limits[PLAY_MIN]), int(tables.limits[PLAY_MAX])
+    least, most = int(tables.limits.play_min[0]), int(tables.limits.play_max[0])
     ends = [least, most, *map(int, tables.start)]
     way = max(max(ends) - min(ends), 2 * int(tables.threshold[-1]), *map(abs, ends))
     numbers = {
@@ -204,12 +203,12 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
     def most(dropped: NDArray[np.int64], bits: int) -> int:
         return 2 ** (bits + int(np.max(dropped, initial=0)))
 
-    ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
-    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number.arriving_bits[0])
+    ends = [int(t.plays.limits.play_min[0]), int(t.plays.limits.play_max[0]), *t.plays.start.tolist()]
+    drive = max(map(abs, t.plays.limits.drives.tolist())) * 2 ** int(t.number.arriving_bits[0])
     led = most(t.of("lag").led.drop, 50)
-    rubbed = int(t.limits[CODE_MAX]) * most(t.of("heat").friction.bits, 0)
+    rubbed = int(t.limits.code_max[0]) * most(t.of("heat").friction.bits, 0)
     numbers = {
-        "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
+        "SIGNAL": codes.largest, "CODE": int(t.limits.code_max[0]),
         "DRIVE": drive,
         "CREEP": most(t.of("creep").block.drop, 50) - 1, "LAG": led, "ASKED": led // 3,
         "COARSE": lag.COARSE, "MOVED": 2 * drive + 2, "MODE": most(t.of("mode").drop, 50),

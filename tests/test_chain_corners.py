@@ -71,7 +71,7 @@ def called(rng: np.random.Generator, one: Compiled, inverse: bool, n: int) -> tu
         kinds += [slots.OP_PUSH] * (len(one.tables.tap) > 0)
     kinds += [slots.OP_TEMPERATURE] * ("set_temperature" in one.tables.calls)
     kinds += [slots.OP_GAIN, slots.OP_TRAVEL] * ("travel" in one.tables.calls)
-    most = int(one.tables.limits[slots.CODE_MAX])
+    most = int(one.tables.limits.code_max[0])
     walk = 0.7 * most * np.sin(np.cumsum(rng.normal(0.0, rng.choice([0.03, 0.3]), n)))
     x = np.select(
         [rng.random(n) < 0.1, rng.random(n) < 0.1], [rng.integers(-most, most, n), rng.choice([-most - 1, 0, most], n)],
@@ -114,7 +114,7 @@ def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> Non
 def reference_signal(one: Compiled, seed: int, n: int, share: float) -> Run:
     """A smooth reference with plateaus and turns of every size over a share of the output range, in float32."""
     rng = np.random.default_rng(seed)
-    low, high = (float(end) for end in one.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    low, high = (float(end) for end in one.tables.limits.outputs)
     phase = np.cumsum(np.where(rng.random(n) < 0.2, 0.0, rng.uniform(0.0, 0.06, n)))
     u = 0.5 * (low + high) + 0.35 * share * (high - low) * (np.sin(phase) + 0.4 * np.sin(6.1 * phase))
     return Run(np.arange(n) * T, np.float32(u).astype(float), {"temperature": 20.0 + u})
@@ -129,7 +129,7 @@ def test_floating_point_stays_within_its_bounds(name: str) -> None:
     with jit.plain():
         v = answers(numbers, run, True).astype(float)
         y = answers(numbers, Run(run.t, v, run.extra), False)
-    ends = (float(numbers.tables.limits[slots.DRIVE_MIN]), float(numbers.tables.limits[slots.DRIVE_MAX]))
+    ends = (float(numbers.tables.limits.drive_min[0]), float(numbers.tables.limits.drive_max[0]))
     wanted = Compensator(one.chain).drives(run, ends)
     bound = bounds.chain_bounds(numbers, "float32")
     assert np.max(np.abs(v - wanted)) <= bound.inverse
@@ -163,7 +163,7 @@ def test_composes_with_the_forward_model_in_spite_of_commits_and_holds(seed: int
     y = one.simulate(v, t=run.t)
     free = ~other & ~held & (np.abs(v) < 4.0)
     assert np.mean(free) > 0.6
-    span = float(np.ptp(numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]))
+    span = float(np.ptp(numbers.tables.limits.outputs))
     assert np.max(np.abs(y - run.v)[free]) <= 1e-12 * span
 
 

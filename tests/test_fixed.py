@@ -91,12 +91,12 @@ def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: 
         tables, form = built(model, arithmetic)
     except FormatError:
         return
-    for operator, first, bound in (
-        ("forward", slots.DRIVE_MIN, form.forward_error),
-        ("inverse", slots.OUTPUT_MIN, form.inverse_error),
+    for operator, ends, bound in (
+        ("forward", tables.limits.drives, form.forward_error),
+        ("inverse", tables.limits.outputs, form.inverse_error),
     ):
         assert bound is not None
-        codes = records(*(int(x) for x in tables.limits[first : first + 2]), seed)
+        codes = records(*map(int, ends), seed)
         most = 2 ** {"q31": 31, "q15": 15}[arithmetic] - 1
         codes = np.concatenate([codes, np.random.default_rng(seed).choice([-most - 1, *codes[:9], most], 60)])
         answers = Session(model, operator, arithmetic, "corners").run(codes)[0]
@@ -120,10 +120,10 @@ def test_bounds_are_not_slack(arithmetic: str) -> None:
     """Some model comes to a quarter of its bound, forward and inverse."""
     model = Cascade(PI([0, 0.1], [0.7, 0.05]), (), 0.0, (-1.0, 1.0))
     tables, form = built(model, arithmetic)
-    codes = records(*(int(x) for x in tables.limits[:2]), 1)
+    codes = records(*(int(x) for x in tables.limits.drives), 1)
     error = np.abs(Session(model, "forward", arithmetic).run(codes)[0] - double(model, "forward", form, codes)).max()
     assert error >= form.forward_error / 4
-    codes = records(*(int(x) for x in tables.limits[2:4]), 1)
+    codes = records(*(int(x) for x in tables.limits.outputs), 1)
     error = np.abs(Session(model, "inverse", arithmetic).run(codes)[0] - double(model, "inverse", form, codes)).max()
     assert form.inverse_error is not None
     assert error >= form.inverse_error / 4
@@ -148,7 +148,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     slopes = [each.front_slopes for each in single]
     both = max(s[1] for s in slopes) / min(s[0] for s in slopes)
     assert form.inverse_rounding <= 2 * max(b * both / (s[1] / s[0]) for b, s in zip(alone, slopes, strict=True))
-    low, high = (int(x) for x in tables.limits[2:4])
+    low, high = (int(x) for x in tables.limits.outputs)
     k = np.linspace(0, 1, 3000)
     codes = np.rint((low + high) / 2 + (high - low) / 2 * np.sin(30 * k) * (1 - 0.9 * k)).astype(np.int64)
     ours, exact = Session(model, "inverse", arithmetic), Session(model, "inverse", clamp=True)
@@ -171,16 +171,16 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         **{
             field: getattr(tables, field).astype(object)
             for field in ("threshold", "weight", "slope", "start_level", "way", "reach", "reciprocal", "shift", "start",
-                          "zero", "limits", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument",
+                          "zero", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument",
                           "below")
-        }
+        },
+        limits=slots.Limits.of(tables.limits.tolist(), object),
     )  # fmt: skip
     for inverse in (False, True):
         state, operations = reference.new_state(whole, inverse), reference.operations(tables, inverse)
         with plain():
             operations.init(whole, state)
-        first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
-        codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
+        codes = records(*map(int, tables.limits.outputs if inverse else tables.limits.drives), 3)[::7]
         answers = []
         for code in codes.tolist():
             with plain():
@@ -217,7 +217,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     """Every code for 16 bits, many for 32: the kernel's curve against the model's own functions."""
     model = load(name)
     tables, form = built(model, arithmetic)
-    low, high = (int(x) for x in tables.limits[:2])
+    low, high = (int(x) for x in tables.limits.drives)
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
     front = reference.front(tables)
     lsb = fixed_tables.lsbs(model, arithmetic)

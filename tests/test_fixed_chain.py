@@ -80,13 +80,13 @@ def test_factors_are_multiplied_like_fractions() -> None:
 def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, Run]:
     """A smooth reference with plateaus in codes, over a share of the output range, and the same in physical units."""
     rng = np.random.default_rng(seed)
-    low, high = (float(end) for end in one.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    low, high = (float(end) for end in one.tables.limits.outputs)
     still = rng.random(N) < 0.2
     still[N // 2 : N // 2 + 100] = True
     phase = np.cumsum(np.where(still, 0.0, rng.uniform(0.0, 0.03, N)))
     u = np.rint(0.5 * (low + high) + 0.5 * share * (high - low) * np.sin(phase))
     y = u * float(codes.output_lsb)
-    degree = 2.0 ** TEMPERATURE_BITS[int(one.tables.limits[slots.CODE_MAX]).bit_length()]
+    degree = 2.0 ** TEMPERATURE_BITS[int(one.tables.limits.code_max[0]).bit_length()]
     extra = {"temperature": np.rint((20.0 + y) * degree) / degree}
     t = np.arange(N) * T
     return Run(t, u, extra), Run(t, y, extra)
@@ -115,7 +115,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     given, exact = record(numbers, codes, seed, share)
     drive = float(codes.drive_lsb)
     v = answers(numbers, given, True).astype(float)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
     wanted = Compensator(one.chain, one.parameters.emit.compensation).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
@@ -125,7 +125,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     if name not in INVERSE_ALONE:
         forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
         y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
-        most = int(numbers.tables.limits[slots.CODE_MAX])
+        most = int(numbers.tables.limits.code_max[0])
         y = np.clip(y, -most - 1, most)  # a mode that rings may leave the codes
         assert np.max(np.abs(forward - y)) <= codes.forward_error
 
@@ -266,9 +266,9 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, 
     numbers, codes = compiled(one, arithmetic)
     v = swept(numbers, N)
     t, output, drive = np.arange(N) * T, float(codes.output_lsb), float(codes.drive_lsb)
-    ends = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]
+    ends = numbers.tables.limits.outputs
     u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))
-    range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits.drives)
     compensator = Compensator(one.chain, one.parameters.emit.compensation)
     wanted = compensator.drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
     worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
@@ -282,7 +282,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
     one = model(chain("led", *STILL[name]))
     numbers, codes = compiled(one, arithmetic)
     drive = float(codes.drive_lsb)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
     for seed in range(3):
         given, exact = record(numbers, codes, seed, 0.5)
         v = answers(numbers, given, True).astype(float)
@@ -293,8 +293,8 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
             wanted = seen[::2] / drive
         else:
             wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
-        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits[slots.DRIVE_MAX]
-        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
+        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits.drive_max[0]
+        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits.drive_max[0]
 
 
 @pytest.mark.thorough(but_one_in=8)
@@ -309,7 +309,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
     op, x, y = [], [], []
     v = np.empty(N)
     ahead = numbers.ahead
-    bits = int(numbers.tables.limits[slots.CODE_MAX]).bit_length()
+    bits = int(numbers.tables.limits.code_max[0]).bit_length()
     for k in range(N):
         warm = "set_temperature" in numbers.tables.calls
         degree = exact.extra["temperature"][k]
@@ -330,7 +330,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
             asked.append(slots.OP_COMMIT)
             given_to.append(answer * drive)
     w, _ = reference.answers(double.tables, True, np.array(asked, dtype=np.uint8), np.array(given_to))
-    low, high = numbers.tables.limits[:2]
+    low, high = numbers.tables.limits.drives
     wanted = np.clip(w[np.array(asked) == slots.OP_STEP] / drive, low, high)
     assert np.max(np.abs(v[calls == slots.OP_STEP] - wanted)) <= codes.inverse_rounding
 
@@ -342,7 +342,7 @@ def test_branches_are_mostly_the_same(arithmetic: str) -> None:
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, 5, 0.5)
     drive = float(codes.drive_lsb)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
     wanted = Compensator(one.chain).drives(exact, ends)  # type: ignore[arg-type]
     left = np.abs(answers(numbers, given, True) - wanted / drive)
     assert np.quantile(left, 0.9) <= codes.inverse_rounding < 0.1 * codes.inverse_error
@@ -503,7 +503,7 @@ def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
     """Creep, once it is within rounding, ends in no change at all; behind a lag a code either way is left."""
     one = model(chain("still", *STILL[name]))
     numbers, _ = compiled(one, arithmetic)
-    low, high = (int(end) for end in numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    low, high = (int(end) for end in numbers.tables.limits.outputs)
     n = 12_000
     allowed = {"creep": 0, "lag": 2, "exact": 1, "lag_and_creep": 2}[name]
     for share in np.random.default_rng(0).uniform(0.15, 0.85, 6):
@@ -561,7 +561,7 @@ def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
     rng = np.random.default_rng(3)
     u = np.rint(3.0 * np.sin(0.02 * np.arange(800)) / float(codes.output_lsb)).astype(np.int64)
     calls: list[tuple[int, int]] = []
-    low, high = (int(end) for end in numbers.tables.limits[:2])
+    low, high = (int(end) for end in numbers.tables.limits.drives)
     for k, each in enumerate(u.tolist()):
         calls.append((slots.OP_STEP, each))
         if k % 7 == 3:
@@ -608,7 +608,7 @@ def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) ->
     numbers, _ = compiled(one, arithmetic)
     static, t = one.cascade, numbers.tables
     assert numbers.codes is not None
-    step = float(numbers.codes.drive_lsb) / 2 ** int(t.plays.limits[slots.FINE])
+    step = float(numbers.codes.drive_lsb) / 2 ** int(t.plays.limits.fine[0])
     end = int(t.moving.bump.domain[0, 1])
     degree = ARITHMETICS[arithmetic].degree
     error = moving.bumps(static, numbers.parts.plays, step, end, degree).error
@@ -630,7 +630,7 @@ def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, ari
     text = f"name: rate_dependence, shape: relaxation, time_constant: {ratio * T}, exponent: {exponent}"
     one = model(chain("yields", text))
     numbers, codes = compiled(one, arithmetic)
-    t, step = numbers.tables.moving, float(codes.drive_lsb) / 2 ** int(numbers.tables.plays.limits[slots.FINE])
+    t, step = numbers.tables.moving, float(codes.drive_lsb) / 2 ** int(numbers.tables.plays.limits.fine[0])
     effect, scale = one.effects[0], one.cascade.pi.thresholds[-1]
     assert isinstance(effect, RelaxingPlays)
     least = dashpot.LEAST_STRETCH * scale
@@ -698,7 +698,7 @@ def test_status_tells_at_either_end_that_a_saturation_has_no_input(
     one = model(chain("limited", f"name: saturation, level: {level:g}, centre: {centre:g}"))
     numbers = tables.build(one.chain, arithmetic, T)
     scale = 1.0 if numbers.codes is None else 1.0 / float(numbers.codes.output_lsb)
-    limits = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1].astype(float)
+    limits = numbers.tables.limits.outputs.astype(float)
     for way, u in zip((-level, level), limits.tolist(), strict=True):
         to_limit = u - (centre + way + 0.5) * scale
         for share, seen in ((0.0, False), (1.001, True)):
@@ -724,7 +724,7 @@ def test_weights_of_the_reference_stay_within_bounds_and_come_to_rest(arithmetic
     v = answers(numbers, given, True) * float(codes.drive_lsb)
     wanted = answers(double, exact, True)
     assert np.max(np.abs(v - wanted)) <= codes.inverse_error * float(codes.drive_lsb)
-    low, high = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1].tolist()
+    low, high = numbers.tables.limits.outputs.tolist()
     step = np.repeat([0.2 * low, 0.7 * high], [5, 200]).round()
     v = answers(numbers, Run(np.arange(205) * T, step, {}), True)
     assert len(set(v[5 + len(numbers.taps.weights) :].tolist())) == 1

@@ -26,7 +26,6 @@ from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
-from hystgen.plays import slots
 
 T = 1e-3
 LAG = "name: lag, time_constant: 0.01"
@@ -198,7 +197,7 @@ def test_what_needs_no_average_has_none() -> None:
     allowed = emitted_files(model(LAG, CREEP, front=BRANCHES, noise_gain=1e3))
     bare = [re.sub(r"sha256 \w+|SHA256 .*", "", text) for text in (plain["noisy.c"], allowed["noisy.c"])]
     assert bare[0] == bare[1]
-    assert compiled(model(CREEP)).tables.limits[slots.OUTPUT_MIN] < 0.0
+    assert compiled(model(CREEP)).tables.limits.output_min[0] < 0.0
 
 
 HEAD = "hystgen: 1\nname: noisy\nunits: {input: V, output: um}\nsample_time: %s\ninput_range: [0, 100]\nmodel:\n"

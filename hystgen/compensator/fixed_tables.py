@@ -40,6 +40,7 @@ from hystgen.front.curve import HALF
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
+from hystgen.plays.slots import Limits
 
 SUM_BITS = 62
 """Bits of a sum of products, excluding its sign: 64 bits then hold the difference of two such sums."""
@@ -392,10 +393,10 @@ class Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 18
-        limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX] = self.drive
-        limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = self.output
-        limits[slots.OFFSET] = self.offset
+        limits = Limits.zeros(1)
+        limits.drive_min[0], limits.drive_max[0] = self.drive
+        limits.output_min[0], limits.output_max[0] = self.output
+        limits.offset[0] = self.offset
         far = 2 * max(map(abs, c.input_range))  # acts like any drive beyond the range, and is finite
 
         def code(v: float) -> Fraction:
@@ -405,14 +406,14 @@ class Builder:
             c, self.drive, lambda v: (math.floor(code(v)), code(v).denominator == 1), lambda v: nearest(code(v))
         )
         if c.branches_differ and self.invertible:
-            limits[slots.HOLD] = math.floor(2 * (self._inverse_rounding() or 0))
-        limits[slots.REAL_MAX] = 2**SUM_BITS
-        limits[slots.PLAY_MIN], limits[slots.PLAY_MAX] = self.play
-        limits[slots.MARGIN], limits[slots.FRACTION] = self.margin, self.bits
-        limits[slots.FINE], limits[slots.CODE_MAX] = self.fine, self.code_max
-        limits[slots.SATURATED] = self._saturated()
+            limits.hold[0] = math.floor(2 * (self._inverse_rounding() or 0))
+        limits.real_max[0] = 2**SUM_BITS
+        limits.play_min[0], limits.play_max[0] = self.play
+        limits.margin[0], limits.fraction[0] = self.margin, self.bits
+        limits.fine[0], limits.code_max[0] = self.fine, self.code_max
+        limits.saturated[0] = self._saturated()
         # half a drive code and the error of a reciprocal, in output codes on the steepest piece
-        limits[slots.SHY] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
+        limits.shy[0] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
 
@@ -432,7 +433,7 @@ class Builder:
             shift=whole(self.shift),
             start=whole(self.start if len(set(self.start)) > 1 else self.start[:1]),
             zero=whole([0]),
-            limits=whole(limits),
+            limits=limits,
             applied=whole(applied),
             ascending=whole(ascending),
             knot=whole([piece.knot for piece in pieces]),

@@ -23,6 +23,7 @@ from hystgen.front.tanh import kernels
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Literals, Start
+from hystgen.plays.slots import Limits
 
 
 def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
@@ -180,16 +181,16 @@ def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
 
 
 def _corners(
-    cascade: StaticModel, dtype: Any, limits: Sequence[float] | None, seen: tuple[float, float]
+    cascade: StaticModel, dtype: Any, limits: Limits | None, seen: tuple[float, float]
 ) -> dict[str, Any]:
-    """The entries of `Tables` for the corner engine; `limits`: as in `Tables` up to OFFSET, None for no limits; `seen`:
+    """The entries of `Tables` for the corner engine; `limits`: as in `Tables`, None for no limits; `seen`:
     range of the plays' input."""
     forward = _forward_curve(cascade, dtype)
     inverse = forward
     if not cascade.inverse_problems():
         ends = None
         if limits is not None:
-            low, high, least, most, offset = (dtype(end) for end in limits)
+            low, high, least, most, offset = map(dtype, (*limits.drives, *limits.outputs, limits.offset[0]))
             ends = (low, high, least - offset, most - offset)
         inverse = _inverse_curve(cascade, dtype, ends)
     memories = {"first": cascade.pi.start, "zero": (0.0,) * len(cascade.pi.start)}
@@ -246,17 +247,18 @@ def build_float(
         sizes.append(size)
         numbers += data
 
-    limits = [0.0] * 10
+    limits = Limits.zeros(1, np.float64)
     if bounded:
         drive = inward(*cascade.input_range, dtype)
         outputs = inward(*cascade.output_range, dtype)
         if not (drive[0] < drive[1] and outputs[0] < outputs[1]):
             message = f"this range of the drive, or that of the output, is narrower than {arithmetic} can tell apart"
             raise FormatError((("input_range",), message))
-        limits[slots.DRIVE_MIN : slots.OUTPUT_MAX + 1] = [float(x) for x in (*drive, *outputs)]
     else:
-        limits[slots.DRIVE_MIN : slots.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
-    limits[slots.OFFSET] = cascade.output_offset
+        drive = outputs = -largest, largest
+    limits.drive_min[0], limits.drive_max[0] = map(float, drive)
+    limits.output_min[0], limits.output_max[0] = map(float, outputs)
+    limits.offset[0] = cascade.output_offset
 
     def not_above(v: float) -> tuple[float, bool]:
         number = dtype(v)
@@ -264,13 +266,13 @@ def build_float(
             number = np.nextafter(number, dtype(-np.inf))
         return float(number), float(number) == v
 
-    low, high = limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX]
+    low, high = map(float, drive)
     applied, ascending = first_moves(cascade, (low, high), not_above, lambda v: float(dtype(v)))
     if cascade.branches_differ and not cascade.inverse_problems():
-        limits[slots.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
-    limits[slots.REAL_MAX] = largest
-    if max(map(abs, limits)) > largest:
-        reached = max(map(abs, limits))
+        limits.hold[0] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
+    limits.real_max[0] = largest
+    reached = max(map(abs, limits[0].tolist()))
+    if reached > largest:
         message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
         raise FormatError((("model",), message))
     seen = (-math.inf, math.inf)
@@ -287,14 +289,14 @@ def build_float(
             [1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights", "pi", "weights"
         ),
         start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states", "pi"),
-        limits=np.array(limits, dtype=dtype),
+        limits=Limits.of(limits.tolist(), dtype),
         applied=np.array(applied, dtype=dtype),
         ascending=np.array(ascending, dtype=np.int64),
         stage_kind=np.array(kinds, dtype=np.int64),
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),
         stage_data=reals(numbers, "parameters of the memoryless stages", "memoryless"),
-        **_corners(cascade, dtype, limits[: slots.OFFSET + 1] if bounded and not cascade.stages else None, seen),
+        **_corners(cascade, dtype, limits if bounded and not cascade.stages else None, seen),
         engine=slots.CORNERS if engine == "corners" else slots.LOOP,
         branches=int(cascade.branches_differ),
         tanh=kernels.TANH_TABLES[arithmetic],

@@ -21,14 +21,7 @@ from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
 from hystgen.front import compensator
 from hystgen.plays import loop
-from hystgen.plays.slots import (
-    CODE_MAX,
-    DRIVE_MAX,
-    DRIVE_MIN,
-    LOOP,
-    OP_STEP,
-    Bytes,
-)
+from hystgen.plays.slots import LOOP, OP_STEP, Bytes
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
@@ -104,7 +97,7 @@ def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[A
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     if found.dtype.kind == "f":
         return found
-    most = int(t.limits[CODE_MAX])
+    most = int(t.limits.code_max[0])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
         raise ValueError(f"fixed point takes codes, integers from {-most - 1} to {most}")
     return found
@@ -113,7 +106,7 @@ def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[A
 def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]:
     """The given numbers, rounded to the nearest that a call accepts as arguments."""
     if t.fixed:
-        most = int(t.limits[CODE_MAX])
+        most = int(t.limits.code_max[0])
         x = np.clip(np.rint(x), -most - 1, most)
     return np.array(x, dtype=t.threshold.dtype)
 
@@ -176,7 +169,7 @@ class Session:
     def drive_range(self) -> tuple[float, float]:
         """`input_range` in the operator's own numbers: physical units, or codes in fixed point."""
         if self._fixed:
-            low, high = self.tables.limits[DRIVE_MIN : DRIVE_MAX + 1]
+            low, high = self.tables.limits.drives
             return float(low), float(high)
         return self._range
 

@@ -18,7 +18,6 @@ from hystgen.plays.loop import State, loop_absorb, loop_rest, loop_start
 from hystgen.plays.slots import (
     DOMAIN,
     HELD,
-    HOLD,
     INPUT_CLAMPED,
     OP_CALL,
     OP_COMMIT,
@@ -27,7 +26,6 @@ from hystgen.plays.slots import (
     OP_STEP,
     OP_UNREAD,
     OUTPUT_CLAMPED,
-    ZERO,
     Bytes,
     Reals,
     StepState,
@@ -112,7 +110,7 @@ def choosing(
         if inverse_fits(t, s, v, up):
             return v, limited
         back = clamp_drive(t, v) - s.step.drive[0]
-        if up == s.step.ascending[0] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+        if up == s.step.ascending[0] and -t.limits.hold[0] <= back <= t.limits.hold[0]:
             return s.step.drive[0], limited
         v, limited = front_inverse(t, w, 1 - up)
         if inverse_fits(t, s, v, 1 - up):
@@ -165,7 +163,7 @@ def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer
     @jit
     def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        loop_rest(s, t.limits[ZERO])
+        loop_rest(s, t.limits.zero[0])
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
@@ -219,7 +217,7 @@ def run_of(
         m = plays(s).step
         for i in range(len(op)):
             call = op[i] & OP_CALL
-            answers[i] = t.limits[ZERO]
+            answers[i] = t.limits.zero[0]
             if call == OP_INIT:
                 init(t, s)
             elif call == OP_COMMIT:
@@ -263,7 +261,7 @@ def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forw
 @jit(inline=True)
 def no_other(t: Limited, s: object, call: int, x: Scalar) -> Scalar:  # noqa: ARG001  the same call for every chain
     """Return 0: a model without effects has no other calls."""
-    return t.limits[ZERO]
+    return t.limits.zero[0]
 
 
 def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hooks: Hooks) -> Operations:
@@ -322,7 +320,7 @@ def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hoo
         if not finite(t, applied):
             m.step.status[0] |= HELD
             return
-        v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
+        v = clamp_drive(t, applied) + t.limits.zero[0]  # no drive is -0
         if v != applied:
             m.step.status[0] |= INPUT_CLAMPED
         m.step.repeated[0] = 0

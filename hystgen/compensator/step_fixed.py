@@ -8,19 +8,18 @@ from hystgen.compensator.step import made_of
 from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.fixed import code, loop_solve
 from hystgen.plays.loop import State, loop_output
-from hystgen.plays.slots import FRACTION, OFFSET
 
 
 @jit
 def output(t: FixedTables, s: State) -> tuple[int, int]:
     """Output code for the present memory, limited to the type, and its status."""
-    return code(t, loop_output(t, s) + t.limits[OFFSET])
+    return code(t, loop_output(t, s) + t.limits.offset[0])
 
 
 @jit
 def inverse_solve(t: FixedTables, s: State, level: int) -> int:
     """Input of the plays that gives output code `level`."""
-    return loop_solve(t, s, (level << t.limits[FRACTION]) - t.limits[OFFSET])
+    return loop_solve(t, s, (level << t.limits.fraction[0]) - t.limits.offset[0])
 
 
 @jit

@@ -17,7 +17,6 @@ from hystgen.emission import runtime
 from hystgen.emission.options import Options
 from hystgen.emission.text import WIDTH, Number, braces, comment_text, constant, literal, operand, structure, table
 from hystgen.parameters.files import Parameters
-from hystgen.plays import slots
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
@@ -294,7 +293,7 @@ class Form(ABC):
 
 def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
     """Limits of drive and output."""
-    ends = [operand(x) for x in numbers.limits[slots.DRIVE_MIN : slots.OUTPUT_MAX + 1]]
+    ends = [operand(x) for x in (*numbers.limits.drives, *numbers.limits.outputs)]
     return (ends[0], ends[1]), (ends[2], ends[3])
 
 
@@ -302,7 +301,7 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
     """Macros that every arithmetic has."""
     ends = numbers.limits
     return [
-        ("OFFSET", operand(ends[slots.OFFSET]), "added to every output"),
+        ("OFFSET", operand(ends.offset[0]), "added to every output"),
         ("START", operand(numbers.start[0]), "value of each play after init"),
         *(
             (f"{op}_{call}_{what}", value, comment)
@@ -313,7 +312,7 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
                 ("ASCENDING", truth(numbers.ascending[j]), "and the direction of its last move"),
             )
         ),
-        ("HOLD", operand(ends[slots.HOLD]), "largest step back at which the drive is held instead"),
+        ("HOLD", operand(ends.hold[0]), "largest step back at which the drive is held instead"),
     ]
 
 
@@ -424,7 +423,7 @@ class EmittedModel:
     def measured(self) -> Measured | None:
         """The largest error that a search finds, for an inverse whose error only the range of the drive bounds."""
         limits = self.numbers.tables.limits
-        whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
+        whole = float(limits.drive_max[0]) - float(limits.drive_min[0])
         if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
             return None
         from hystgen.chain.chain import Chain

@@ -85,14 +85,14 @@ class FixedForm(Form):
             t, drive, output, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
             (*_pointers(t, options, writer), *curves),
             _errors(options, (form.forward_error, form.inverse_error, rounding)),
-            fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends[slots.FINE]) > 0,
-            saturates=bool(ends[slots.SATURATED] == ends[slots.CODE_MAX]),
+            fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends.fine[0]) > 0,
+            saturates=bool(ends.saturated[0] == ends.code_max[0]),
             lsb=(float(form.drive_lsb), float(form.output_lsb)),
             precision=(
                 *_precision(parameters, form, " on the same branch" * bool(t.branches)),
                 f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 "
                 "bits hold 2^63),",
-                f"    inputs of plays between {ends[slots.PLAY_MIN]} and {ends[slots.PLAY_MAX]}, "
+                f"    inputs of plays between {ends.play_min[0]} and {ends.play_max[0]}, "
                 f"{form.sum_bits} fraction bits of an output code",
             ),
         )
@@ -175,7 +175,7 @@ class FixedForm(Form):
     def effects(self, t: ChainTables) -> list[Macro]:
 
         number = t.number
-        low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+        low, high = t.plays.limits.drives
         return [
             ("FINE_MIN", operand(low), "ends of the drive range at the output of the drive side"),
             ("FINE_MAX", operand(high), ""),
@@ -269,10 +269,10 @@ def _macros(t: FixedTables) -> list[Macro]:
     shy = "output codes that rounding can add, by half a drive code and an inexact reciprocal"
     return [
         ("START_STEP", str(step), "entries from one play to the next; reset starts each at 0"),
-        ("CODE_MAX", literal(t.limits[slots.CODE_MAX]), "the largest code of either sign"),
-        ("FRACTION", f"{t.limits[slots.FRACTION]}u", "bits of a sum below an output code"),
-        ("FINE", f"{t.limits[slots.FINE]}u", "bits of an input of the plays below a drive code"),
-        ("SHY", literal(t.limits[slots.SHY]), shy),
+        ("CODE_MAX", literal(t.limits.code_max[0]), "the largest code of either sign"),
+        ("FRACTION", f"{t.limits.fraction[0]}u", "bits of a sum below an output code"),
+        ("FINE", f"{t.limits.fine[0]}u", "bits of an input of the plays below a drive code"),
+        ("SHY", literal(t.limits.shy[0]), shy),
     ]
 
 
@@ -300,17 +300,17 @@ def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[Constant
 
 
 def _ends(t: FixedTables) -> list[str]:
-    margin = t.limits[slots.MARGIN]
-    return [literal(t.limits[slots.PLAY_MIN] - margin), literal(t.limits[slots.PLAY_MAX] + margin)]
+    margin = t.limits.margin[0]
+    return [literal(t.limits.play_min[0] - margin), literal(t.limits.play_max[0] + margin)]
 
 
 def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
     """The tables of engine corners: one curve for both operators, and the contents of a start memory."""
     never = (t.reach[-1], t.way[-1], 0, 0, 1)
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
-    low, high = t.limits[slots.PLAY_MIN], t.limits[slots.PLAY_MAX]
-    ends = f"{{{entries([t.limits[slots.MARGIN] - low, high + t.limits[slots.MARGIN]])}}}"
-    parts = [f"{writer.name}_model_segment", literal(t.limits[slots.OFFSET]), ends, str(len(t.threshold) - 1)]
+    low, high = t.limits.play_min[0], t.limits.play_max[0]
+    ends = f"{{{entries([t.limits.margin[0] - low, high + t.limits.margin[0]])}}}"
+    parts = [f"{writer.name}_model_segment", literal(t.limits.offset[0]), ends, str(len(t.threshold) - 1)]
     found = [
         writer.rows("segment_t", "model_segment", map(entries, [*plays, never]), len(t.way), last=""),
         writer.entries("curve_t", "model_curve", parts),

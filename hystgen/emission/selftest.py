@@ -91,7 +91,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     from hystgen.compensator.chain.parts import PARTS
 
     degree, one = setting_codes(t)
-    drive_low, drive_high, low, high = (float(end) for end in t.limits[: slots.OUTPUT_MAX + 1])
+    drive_low, drive_high, low, high = (float(end) for end in (*t.limits.drives, *t.limits.outputs))
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
         return drive_low + (0.5 + way) * (drive_high - drive_low)
@@ -108,9 +108,8 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
 
 def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[Sample]:
     numbers, between = one.numbers.tables, one.form.between
-    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
-    low, high = numbers.limits[first], numbers.limits[first + 1]
-    drive_low, drive_high = numbers.limits[slots.DRIVE_MIN], numbers.limits[slots.DRIVE_MAX]
+    low, high = numbers.limits.outputs if inverse else numbers.limits.drives
+    drive_low, drive_high = numbers.limits.drive_min[0], numbers.limits.drive_max[0]
     calls, arguments = [], []
     for i, part in enumerate(_fractions(180)):
         calls.append(slots.OP_STEP)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from hystgen.basics.jit import jit
 from hystgen.front.stage import CurveTables, Polynomials
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, FINE
 
 HALF = 1 << 30
 
@@ -36,21 +35,21 @@ def front_forward(t: CurveTables, v: int, ascending: int) -> int:
     """w = G[v] on one branch."""
     if t.fronts:
         return curve(t, FORWARD + 1 - ascending, v)
-    return v << t.limits[FINE]
+    return v << t.limits.fine[0]
 
 
 @jit
 def front_inverse(t: CurveTables, w: int, ascending: int) -> tuple[int, int]:
     """v = G^-1[w] on one branch (one code out of range if w is beyond its domain), and whether an envelope limits w."""
     if not t.fronts:
-        return nearest(w, t.limits[FINE]), 0
+        return nearest(w, t.limits.fine[0]), 0
     which = INVERSE + 1 - ascending
     if w > t.domain[which, 1]:
         if w > t.domain[which, 1] + t.edge[which, 1]:
-            return t.limits[DRIVE_MAX] + 1, 1 if w > t.argument[which, 1] else 0
-        return t.limits[DRIVE_MAX], 0
+            return t.limits.drive_max[0] + 1, 1 if w > t.argument[which, 1] else 0
+        return t.limits.drive_max[0], 0
     if w < t.domain[which, 0]:
         if w < t.domain[which, 0] - t.edge[which, 0]:
-            return t.limits[DRIVE_MIN] - 1, 1 if w < t.argument[which, 0] else 0
-        return t.limits[DRIVE_MIN], 0
+            return t.limits.drive_min[0] - 1, 1 if w < t.argument[which, 0] else 0
+        return t.limits.drive_min[0], 0
     return nearest(curve(t, which, w), t.below[which]), 0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.plays.slots import Counts, Reals
+from hystgen.plays.slots import Counts, Limits, Reals
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class CurveTables(Polynomials, Protocol):
     """Constants of the stages in fixed point, as `hystgen.compensator.layout.FixedTables` has them."""
 
     @property
-    def limits(self) -> Reals: ...
+    def limits(self) -> Limits: ...
     @property
     def domain(self) -> Reals: ...
     @property

@@ -10,16 +10,7 @@ from typing import Protocol
 
 from hystgen.basics.jit import jit
 from hystgen.plays.loop import PlayTables, State, loop_output
-from hystgen.plays.slots import (
-    CODE_MAX,
-    FRACTION,
-    MARGIN,
-    OUTPUT_CLAMPED,
-    PLAY_MAX,
-    PLAY_MIN,
-    SATURATED,
-    Reals,
-)
+from hystgen.plays.slots import OUTPUT_CLAMPED, Reals
 
 
 class FixedPlayTables(PlayTables, Protocol):
@@ -58,12 +49,12 @@ def nearest(x: int, bits: int) -> int:
 @jit
 def code(t: FixedPlayTables, total: int) -> tuple[int, int]:
     """Output code of a sum, limited to the type, and its status bits."""
-    found = nearest(total, t.limits[FRACTION])
-    bits = OUTPUT_CLAMPED if found > t.limits[SATURATED] or found < -t.limits[SATURATED] else 0
-    if found > t.limits[CODE_MAX]:
-        return t.limits[CODE_MAX], bits
-    if found < -t.limits[CODE_MAX]:
-        return -t.limits[CODE_MAX], bits
+    found = nearest(total, t.limits.fraction[0])
+    bits = OUTPUT_CLAMPED if found > t.limits.saturated[0] or found < -t.limits.saturated[0] else 0
+    if found > t.limits.code_max[0]:
+        return t.limits.code_max[0], bits
+    if found < -t.limits.code_max[0]:
+        return -t.limits.code_max[0], bits
     return found, bits
 
 
@@ -109,11 +100,11 @@ def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> in
     """The input of the plays, at most slightly outside their range, at which the output is d beyond that at w."""
     step = divide_by_slope(t, d, k)
     if rising:
-        most = t.limits[PLAY_MAX] + t.limits[MARGIN]
+        most = t.limits.play_max[0] + t.limits.margin[0]
         if step > most - w:
             return most
         return w + step
-    least = t.limits[PLAY_MIN] - t.limits[MARGIN]
+    least = t.limits.play_min[0] - t.limits.margin[0]
     if step > w - least:
         return least
     return w - step

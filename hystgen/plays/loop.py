@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from hystgen.basics.jit import Element, Scalar, jit
-from hystgen.plays.slots import ZERO, Reals, StepState
+from hystgen.plays.slots import Limits, Reals, StepState
 
 
 class PlayTables(Protocol):
@@ -24,7 +24,7 @@ class PlayTables(Protocol):
     @property
     def weight(self) -> Reals: ...
     @property
-    def limits(self) -> Reals: ...
+    def limits(self) -> Limits: ...
 
 
 class LoopTables(PlayTables, Protocol):
@@ -83,7 +83,7 @@ def loop_absorb(t: PlayTables, s: State, w: Scalar) -> None:
 @jit
 def loop_output(t: PlayTables, s: State) -> Element:
     """p_0 play_0 + p_1 play_1 + ..., in this order."""
-    total = t.limits[ZERO]
+    total = t.limits.zero[0]
     for i in range(len(s.play)):
         total = total + t.weight[i] * s.play[i]
     return total
@@ -94,8 +94,8 @@ def loop_solve(t: LoopTables, s: State, output: Scalar) -> Scalar:
     """Input of the plays that gives `output`: assumes that every play follows, then drops the plays with the largest
     thresholds one by one until the solution makes the last remaining play follow."""
     rising = output >= loop_output(t, s)
-    tail = t.limits[ZERO]
-    next_follows = t.limits[ZERO]
+    tail = t.limits.zero[0]
+    next_follows = t.limits.zero[0]
     for last in range(len(s.play) - 1, -1, -1):
         k = last + 1
         if rising:

@@ -1,6 +1,8 @@
-"""Numbers that the bit reference shares with the C: indices into the array of limits, status bits and calls."""
+"""Numbers that the bit reference shares with the C: limits, status bits and calls."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +14,6 @@ Reals = NumberArray
 Counts = NumberArray
 Bytes = NDArray[np.uint8]
 
-# indices into `limits`, the same in every arithmetic
-DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
-HOLD, REAL_MAX, ZERO = 7, 8, 9
-
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
@@ -26,8 +24,37 @@ OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
 # the bits that identify a call, and a bit that leaves its status for a later call to read together with its own
 OP_CALL, OP_UNREAD = 127, 128
-# further indices into `limits`, only in fixed point
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)
+
+
+class Limits(Struct):
+    """The limits of drive and output, and what goes with them; the second half is used in fixed point only."""
+
+    drive_min: Real
+    drive_max: Real
+    output_min: Real
+    output_max: Real
+    offset: Real  # added to every output
+    hold: Real  # largest step back at which the drive is held instead
+    real_max: Real  # largest number
+    zero: Real  # in the type of the arithmetic
+    play_min: Real  # of the inputs of the plays
+    play_max: Real
+    margin: Real  # by which rounding may take such an input further
+    fraction: Real  # bits of a sum below an output code
+    fine: Real  # bits of an input of the plays below a drive code
+    code_max: Real  # largest code of either sign
+    saturated: Real  # largest sum that is not reported as limited
+    shy: Real  # [output codes] by which a step that may end at a limit is found beforehand
+
+    @property
+    def drives(self) -> NDArray[Any]:
+        """Least and largest drive."""
+        return np.append(self.drive_min, self.drive_max)
+
+    @property
+    def outputs(self) -> NDArray[Any]:
+        """Least and largest output."""
+        return np.append(self.output_min, self.output_max)
 
 
 class StepState(Struct):

@@ -72,7 +72,7 @@ class _Textbook:
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
     """A path of kinks, each met to within one last bit, for the current memory and for that of init and reset."""
     whole = real.kind == "i"
-    low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+    low, high = (float(a) for a in tables.limits.drives)
     memory = _Textbook(tables)
     kinds = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT], dtype=np.uint8)
     op = rng.choice(kinds, length, p=[0.9, 0.06, 0.04])

@@ -64,8 +64,8 @@ def _coincidences(
     With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
     on the order of its checks.
     """
-    drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
-    finer = 2.0 ** int(tables.limits[slots.FINE]) if isinstance(tables, FixedTables) else 1.0
+    drive_low, drive_high = (float(a) for a in tables.limits.drives)
+    finer = 2.0 ** int(tables.limits.fine[0]) if isinstance(tables, FixedTables) else 1.0
     ways = np.append(tables.threshold[1:].astype(float) / finer, drive_high - drive_low)
     drive = np.empty(400)
     at = drive_low
@@ -104,7 +104,7 @@ def _onto_the_bends(
 
     A piece between two bends can be as short as one code.
     """
-    low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+    low, high = (float(a) for a in tables.limits.drives)
     drive: NDArray[np.float64] = rng.choice(bends, length)
     drive = np.clip(drive + least(drive) * rng.integers(-1, 2, length), low, high)
     if not inverse:
@@ -138,9 +138,8 @@ def suite(
 
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
     """Steps mixed with all other calls, sparsely and densely."""
-    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
-    low, high = (float(a) for a in tables.limits[first : first + 2])
-    drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+    low, high = (float(a) for a in (tables.limits.outputs if inverse else tables.limits.drives))
+    drive_low, drive_high = (float(a) for a in tables.limits.drives)
     rng = np.random.default_rng(20261126)
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
     if "set_temperature" in tables.calls:
@@ -202,8 +201,7 @@ def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple
 def _suite(
     tables: Tables | FixedTables, real_type: np.dtype[Any], inverse: bool, length: int
 ) -> Iterator[Calls]:
-    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
-    low, high = (float(x) for x in tables.limits[first : first + 2])
+    low, high = (float(x) for x in (tables.limits.outputs if inverse else tables.limits.drives))
     middle, half = (low + high) / 2, (high - low) / 2
     whole = real_type.kind == "i"
     real = np.float64 if whole else real_type.type
@@ -238,7 +236,7 @@ def _suite(
 
     levels = (tables.start_level if inverse else tables.threshold)[1:].astype(float)
     if isinstance(tables, FixedTables):
-        levels = levels / 2.0 ** int(tables.limits[slots.FRACTION] if inverse else tables.limits[slots.FINE])
+        levels = levels / 2.0 ** int(tables.limits.fraction[0] if inverse else tables.limits.fine[0])
     bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(np.abs(at).astype(real)))
     if len(levels) > 0:
         yield record("onto the plays", _onto_the_plays(levels, bit, low, high, length, rng))
@@ -272,7 +270,7 @@ def _suite(
     x[places] = rng.choice(special, int(places.sum()))
     yield "resets", rng.choice(kinds, length, p=chances), x
     if inverse:
-        drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+        drive_low, drive_high = (float(a) for a in tables.limits.drives)
         for name, chance in (("commits", 0.3), ("rare commits", 0.01)):
             op = np.where(rng.random(length) < chance, slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
             spread = drive_high - drive_low

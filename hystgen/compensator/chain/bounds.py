@@ -34,7 +34,6 @@ from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.maps import MapErrors
 from hystgen.effects.part import Gained, Speed
 from hystgen.effects.plays import CLOSE, DASHPOT, DILATED, RELAXING, SEEN
-from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
 
@@ -58,7 +57,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
     bent = moving.largest_bend(static, compiled.parts.plays)
     plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
     output = plays * math.prod(one.growth for one in compiled.behind)
-    ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
+    ends = [abs(float(t.limits.output_min[0])), abs(float(t.limits.output_max[0]))]
     settings = 2.0 * max(ends) * (1 + 3 * t.number_of("clock"))  # a drift has six roundings of its own
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
@@ -67,7 +66,7 @@ def _mapped(compiled: Compiled, u: float, kind: str) -> tuple[float, float, floa
     """Maps of the output: the slope of their inverse at its ends, the roundings of the inverse in terms of its result,
     and the roundings of the maps."""
     limits = compiled.tables.limits
-    ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
+    ends = np.array([float(limits.output_min[0]), float(limits.output_max[0])]) - compiled.static.output_offset
     found = MapErrors(ends, 1.0, 0.0, 0.0)
     for each in reversed(compiled.parts.maps):
         found = each.errors(found, u, kind)
@@ -190,7 +189,7 @@ def kept_branch(compiled: Compiled) -> float:
     branches stays on its branch.
 
     The drive stays put up to a lag's share theta of the distance to the other branch, plus the step back that rounding
-    may cause, `limits[HOLD]`, beyond a target that itself has half of that rounding error. Both branches rise between
+    may cause, `limits.hold[0]`, beyond a target that itself has half of that rounding error. Both branches rise between
     grid points, so their values there bound all values in between.
     """
     static, t = compiled.static, compiled.tables
@@ -198,7 +197,7 @@ def kept_branch(compiled: Compiled) -> float:
     unit = 1.0
     if compiled.codes is not None:
         unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number.drive_bits[0])
-    more = 1.5 * float(t.plays.limits[slots.HOLD]) * unit
+    more = 1.5 * float(t.plays.limits.hold[0]) * unit
     low, high = static.input_range
     drives = [low + (high - low) * i / CELLS for i in range(CELLS + 1)]
     worst = 0.0

@@ -278,8 +278,8 @@ class Bounds:
         """Error of the play sum that the inverse asks for, in output codes."""
         _, slope, back, _ = self._mapped()
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
-        limits = self.tables.limits
-        short = max(high - float(limits[3]), float(limits[2]) - low, 0.0)
+        least, most = self.tables.limits.outputs
+        short = max(high - float(most), float(least) - low, 0.0)
         error = slope * (short + (1.0 + self.drifted) * self._signal) + back
         if self.taps:
             size = max(self.sizes.undone)

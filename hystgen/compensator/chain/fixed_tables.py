@@ -58,7 +58,7 @@ from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.effects.plays import FixedMovingTables
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
-from hystgen.plays.slots import Reals
+from hystgen.plays.slots import Limits
 
 M = TypeVar("M")
 
@@ -125,7 +125,7 @@ class _Builder:
         limits = self._limits(plays.limits)
         maps = self._maps()
         drive = [end << self.inner.fine for end in self.inner.drive]
-        plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
+        plays.limits.drive_min[0], plays.limits.drive_max[0] = drive
         given = FixedChainTables(
             plays,
             limits,
@@ -149,7 +149,7 @@ class _Builder:
             self.bumps,
         )
         if static.branches_differ:
-            plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number.dither[0], self.turning)
+            plays.limits.hold[0] = hold(bounds.hold(), tables.number.dither[0], self.turning)
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
@@ -264,18 +264,18 @@ class _Builder:
             self._refuse("noncongruent: plays are bent too sharply within their range")
             raise
 
-    def _limits(self, plays: Reals) -> NDArray[Any]:
+    def _limits(self, plays: Limits) -> Limits:
         """The limits of the whole chain."""
-        limits = np.array(plays)
+        limits = plays.copy()
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
         slack = Fraction(1, 1024)  # rounding in double precision may have moved an end off its code by this much
-        limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
-        limits[slots.OFFSET] = 0
+        limits.output_min[0], limits.output_max[0] = math.ceil(low - slack), math.floor(high + slack)
+        limits.offset[0] = 0
         most = self.about.code_max
-        if limits[slots.OUTPUT_MIN] < -most or limits[slots.OUTPUT_MAX] > most:
-            limits[slots.OUTPUT_MIN] = max(limits[slots.OUTPUT_MIN], -most)
-            limits[slots.OUTPUT_MAX] = min(limits[slots.OUTPUT_MAX], most)
-        if limits[slots.OUTPUT_MAX] - limits[slots.OUTPUT_MIN] < 2:
+        if limits.output_min[0] < -most or limits.output_max[0] > most:
+            limits.output_min[0] = max(limits.output_min[0], -most)
+            limits.output_max[0] = min(limits.output_max[0], most)
+        if limits.output_max[0] - limits.output_min[0] < 2:
             message = f"lies so far from 0 that {self.arithmetic} has no codes for the range; move it nearer to 0"
             raise FormatError((("model", "output_offset"), message))
         return limits
@@ -428,5 +428,5 @@ def setting_codes(tables: ChainTables) -> tuple[float, float]:
     """The increment for one degree, and the value that sets the gain to 1; codes in fixed point."""
     if not tables.fixed:
         return 1.0, 1.0
-    most = int(tables.limits[slots.CODE_MAX]) + 1
+    most = int(tables.limits.code_max[0]) + 1
     return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4

@@ -39,7 +39,6 @@ from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.part import FloatSurroundings
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
-from hystgen.plays import slots
 
 ROUNDINGS = 4.0
 """[half last bits of the largest drive] Rounding difference between the plays' input as solved for and as it arrives,
@@ -96,7 +95,7 @@ def build(
     low, high = inward(*output_range(static, parts, seconds), dtype)
     if not low < high:
         raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))
-    plays.limits[slots.OUTPUT_MIN], plays.limits[slots.OUTPUT_MAX] = low, high
+    plays.limits.output_min[0], plays.limits.output_max[0] = low, high
 
     turning = parts.turning(static.branches_differ)
     ones = parts.ones(seconds, turning)
@@ -117,7 +116,7 @@ def build(
     rounded = ROUNDINGS * float(np.finfo(dtype).eps) / 2 * max(map(abs, static.input_range))
     dither = max(rounded * max(lead(leading), 1.0), drive_lsb or 0.0)
     if static.branches_differ:
-        plays.limits[slots.HOLD] = hold(plays.limits[slots.HOLD], dither, turning)
+        plays.limits.hold[0] = hold(plays.limits.hold[0], dither, turning)
     about = FloatSurroundings(
         seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
     )

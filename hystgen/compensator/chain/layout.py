@@ -26,7 +26,7 @@ from hystgen.effects.part import One
 from hystgen.effects.plays import FixedMovingTables, MovingTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
-from hystgen.plays.slots import Counts, Reals
+from hystgen.plays.slots import Counts, Limits, Reals
 
 
 class ChainNumbers(Struct):
@@ -106,7 +106,7 @@ class ChainTables(NamedTuple):
     """
 
     plays: Any  # narrowed by the two arithmetics, like the next ones
-    limits: Reals
+    limits: Limits
     moving: Any
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # of their blocks

@@ -19,7 +19,6 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects.base import Array, Run
 from hystgen.parameters.schema import Compensation
-from hystgen.plays import slots
 
 SAMPLES = 800
 """[samples] Of each kind of reference: the error found is then at least 0.79 of that with 3000, in half a second. Set
@@ -51,8 +50,8 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     the value at which their effect changes nothing."""
     t, codes = compiled.tables, compiled.codes
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
-    ends = float(t.limits[slots.DRIVE_MIN]) * drive, float(t.limits[slots.DRIVE_MAX]) * drive
-    low, high = (float(end) for end in t.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    ends = float(t.limits.drive_min[0]) * drive, float(t.limits.drive_max[0]) * drive
+    low, high = (float(end) for end in t.limits.outputs)
     fastest = compiled.largest_step / (ends[1] - ends[0])
     worst, count = 0.0, 0
     columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.columns}

@@ -26,7 +26,6 @@ from hystgen.plays.slots import (
     CORNERS,
     DOMAIN,
     HELD,
-    HOLD,
     INPUT_CLAMPED,
     LIMITED_SETTING,
     OP_CORRECT,
@@ -39,7 +38,6 @@ from hystgen.plays.slots import (
     OP_TRAVEL,
     OP_TRAVELLED,
     SLEW_LIMITED,
-    ZERO,
     Counts,
     Reals,
 )
@@ -182,9 +180,9 @@ def made_of(
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
         """Reset offset and gains to their values in the parameter file."""
-        s.own.offset[0] = t.limits[ZERO]
-        s.reached.drive[0] = t.limits[ZERO]
-        s.reached.rest[0] = t.limits[ZERO]
+        s.own.offset[0] = t.limits.zero[0]
+        s.reached.drive[0] = t.limits.zero[0]
+        s.reached.rest[0] = t.limits.zero[0]
         blocks_reset(t, s)
 
     @jit
@@ -198,7 +196,7 @@ def made_of(
     def turns(t: ChainTables, back: Scalar, way: Scalar) -> bool:
         """Whether a drive that should go back by `back` turns to the other branch, `way` from there. If it leads a lag,
         it turns only if holding misses by more than the lag would in the first sample of a turn over `way`."""
-        missed = back - t.plays.limits[HOLD]
+        missed = back - t.plays.limits.hold[0]
         if not t.turning:
             return bool(missed > 0)
         return bool(missed > led_missed(t.blocks[LED], -way if way < 0 else way))
@@ -230,8 +228,8 @@ def made_of(
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
         """Settle everything."""
-        s.steady.way[0] = t.limits[ZERO]
-        s.steady.moved[0] = t.limits[ZERO]
+        s.steady.way[0] = t.limits.zero[0]
+        s.steady.moved[0] = t.limits.zero[0]
         s.steady.rises[0] = 1
 
     @jit
@@ -259,7 +257,7 @@ def made_of(
     def quiet_rest(t: ChainTables, s: ChainState, a: Scalar) -> None:
         """Record that everything is at rest with a in front of the plays."""
         s.quiet.arrived[0] = a
-        s.quiet.reference[0] = t.limits[ZERO]
+        s.quiet.reference[0] = t.limits.zero[0]
         s.quiet.equal[0] = 0
 
     @jit
@@ -323,12 +321,12 @@ def made_of(
             travelled(t, s, v)
         x = drive_signal(t, reached)
         steady = t.turning and s.own.inverse[0]
-        before = led_state(s.blocks[LED]) if steady else t.limits[ZERO]
+        before = led_state(s.blocks[LED]) if steady else t.limits.zero[0]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
         if steady and moving:
             led_absorb(s.blocks[LED], before)
             s.steady.moved[0] = s.steady.way[0]
-            s.steady.way[0] = t.limits[ZERO]
+            s.steady.way[0] = t.limits.zero[0]
         elif steady:
             steady_rest(t, s)
         if t.quiet:
@@ -353,7 +351,7 @@ def made_of(
         else:
             drive, left = ramp(before, rest, -t.number.slew_falling[0], -t.number.slew_falling_rest[0])
             beyond = v < drive or (v == drive and left > 0)
-        return (drive, left) if beyond else (v, t.limits[ZERO])
+        return (drive, left) if beyond else (v, t.limits.zero[0])
 
     @jit
     def forward_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
@@ -361,7 +359,7 @@ def made_of(
         if not t.slew:
             return v
         before, rest = s.reached.drive[0], s.reached.rest[0]
-        drive, left = nearest_ramp(t, before, rest, v) if s.own.moving[0] else (v, t.limits[ZERO])
+        drive, left = nearest_ramp(t, before, rest, v) if s.own.moving[0] else (v, t.limits.zero[0])
         s.reached.drive[0], s.reached.rest[0] = drive, left
         return drive
 
@@ -369,7 +367,7 @@ def made_of(
     def inverse_within(t: ChainTables, s: ChainState, v: Scalar) -> tuple[Scalar, Scalar]:
         """The drive nearest to v that the amplifier reaches in one step from the last applied drive, and its rounding
         remainder; the last drive keeps its own remainder if it was the answer."""
-        rest = s.reached.rest[0] if s.own.applied[0] == s.reached.drive[0] else t.limits[ZERO]
+        rest = s.reached.rest[0] if s.own.applied[0] == s.reached.drive[0] else t.limits.zero[0]
         return nearest_ramp(t, s.own.applied[0], rest, v)
 
     @jit
@@ -557,7 +555,7 @@ def made_of(
         if not finite(t, v):
             s.plays.step.status[0] |= HELD
             return
-        inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
+        inside = clamp_drive(t, v) + t.limits.zero[0]  # no drive is -0
         if inside != v:
             s.plays.step.status[0] |= INPUT_CLAMPED
         if s.own.moving[0]:
@@ -589,7 +587,7 @@ def made_of(
             correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
-        return t.limits[ZERO]
+        return t.limits.zero[0]
 
     hooks = Hooks(plays_in, finite, seen, shown, unread, inverse_held, stands, inverse_sought, other)
     return operations_of(False, init, reset, seen, hooks), operations_of(True, init, reset, seen, hooks)

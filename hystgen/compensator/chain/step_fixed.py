@@ -20,7 +20,7 @@ from hystgen.compensator.layout import FixedTables
 from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
-from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
+from hystgen.plays.slots import OUTPUT_CLAMPED, Reals, zero
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
 
@@ -121,10 +121,10 @@ def drive_code(t: FixedChainTables, x: int) -> int:
 def output_code(t: FixedChainTables, y: int) -> tuple[int, int]:
     """The output code of a signal, limited to the type, and its status."""
     code = nearest(y, t.number.level_bits[0])
-    if code > t.limits[CODE_MAX]:
-        return t.limits[CODE_MAX], OUTPUT_CLAMPED
-    if code < -t.limits[CODE_MAX]:
-        return -t.limits[CODE_MAX], OUTPUT_CLAMPED
+    if code > t.limits.code_max[0]:
+        return t.limits.code_max[0], OUTPUT_CLAMPED
+    if code < -t.limits.code_max[0]:
+        return -t.limits.code_max[0], OUTPUT_CLAMPED
     return code, 0
 
 

@@ -7,20 +7,20 @@ from hystgen.compensator.layout import Tables
 from hystgen.compensator.step import corners_of, turn_to
 from hystgen.front.compensator import front_forward
 from hystgen.plays.corners.corners_float import Memory, plays_step, start
-from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
+from hystgen.plays.slots import HELD, INPUT_CLAMPED
 
 
 @jit(inline=True)
 def forward_step(t: Tables, m: Memory, v: Scalar) -> Scalar:
     """Answer one sample."""
-    if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
-        if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
+    if not (t.limits.drive_min[0] <= v <= t.limits.drive_max[0]):
+        if not (-t.limits.real_max[0] <= v <= t.limits.real_max[0]):
             m.step.status[0] |= HELD
-            return m.here.output[0] + t.limits[OFFSET]
-        v = t.limits[DRIVE_MIN] if v < t.limits[DRIVE_MIN] else t.limits[DRIVE_MAX]
+            return m.here.output[0] + t.limits.offset[0]
+        v = t.limits.drive_min[0] if v < t.limits.drive_min[0] else t.limits.drive_max[0]
         m.step.status[0] |= INPUT_CLAMPED
     turn_to(m, v)
-    return plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0])) + t.limits[OFFSET]
+    return plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0])) + t.limits.offset[0]
 
 
 @jit

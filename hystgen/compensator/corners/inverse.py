@@ -15,36 +15,25 @@ from hystgen.plays.corners.corners_float import (
     stop_in_block,
     take_back,
 )
-from hystgen.plays.slots import (
-    DRIVE_MAX,
-    DRIVE_MIN,
-    HELD,
-    INPUT_CLAMPED,
-    OFFSET,
-    OUTPUT_CLAMPED,
-    OUTPUT_MAX,
-    OUTPUT_MIN,
-    REAL_MAX,
-    ZERO,
-)
+from hystgen.plays.slots import HELD, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 
 @jit
 def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
     """Answer any sample that is not usual."""
-    x = u - t.limits[OFFSET]
+    x = u - t.limits.offset[0]
     bits = 0
     copy_place(m.undo, m.here)
-    if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
-        bits = INPUT_CLAMPED if -t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX] else HELD
-        x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
+    if not (t.limits.output_min[0] <= u <= t.limits.output_max[0]):
+        bits = INPUT_CLAMPED if -t.limits.real_max[0] <= u <= t.limits.real_max[0] else HELD
+        x = (t.limits.output_min[0] if u < t.limits.output_min[0] else t.limits.output_max[0]) - t.limits.offset[0]
     if bits == HELD:
         if m.step.stepped[0] and m.step.committed[0]:
             move_to_output(t.inverse, m, m.step.returned[0])
     elif m.plays.limited[0] and (x >= m.here.input[0] if m.here.rising[0] else x <= m.here.input[0]):
         bits |= OUTPUT_CLAMPED
     elif x != m.here.input[0] and not move_to_input(t.inverse, m, x):
-        stop_in_block(t.inverse, m, t.limits[DRIVE_MAX] if m.here.rising[0] else t.limits[DRIVE_MIN], x)
+        stop_in_block(t.inverse, m, t.limits.drive_max[0] if m.here.rising[0] else t.limits.drive_min[0], x)
         m.plays.limited[0] = 1
         bits |= OUTPUT_CLAMPED
     m.step.before[0] = m.here.input[0]
@@ -58,7 +47,7 @@ def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
 def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
     """Answer one sample."""
     rising = m.here.rising[0]
-    x = u - t.limits[OFFSET]
+    x = u - t.limits.offset[0]
     at = m.here.input[0]
     on = x > at if rising else x < at
     most = m.plays.next[0] if on else at
@@ -79,8 +68,8 @@ def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
     """Replace the last answer by the drive that was actually applied."""
-    v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
-    if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
+    v = clamp_drive(t, applied) + t.limits.zero[0]  # no drive is -0
+    if not (-t.limits.real_max[0] <= applied <= t.limits.real_max[0]):
         m.step.status[0] |= HELD
         return
     if v != applied:

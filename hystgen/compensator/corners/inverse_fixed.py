@@ -8,17 +8,7 @@ from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, along, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.corners_float import copy_place
 from hystgen.plays.fixed import divide_by_slope, nearest
-from hystgen.plays.slots import (
-    DRIVE_MAX,
-    DRIVE_MIN,
-    FINE,
-    FRACTION,
-    INPUT_CLAMPED,
-    OUTPUT_CLAMPED,
-    OUTPUT_MAX,
-    OUTPUT_MIN,
-    SHY,
-)
+from hystgen.plays.slots import INPUT_CLAMPED, OUTPUT_CLAMPED
 
 NEVER = -(2**31)
 
@@ -40,12 +30,12 @@ def inverse_stay(m: FixedMemory) -> None:
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: int) -> None:
     """Make steps usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.here.rising[0]
-    most = inverse_along(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
-    end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
+    most = inverse_along(m, t.limits.output_max[0] if rising else t.limits.output_min[0])
+    end = (t.limits.drive_max[0] if rising else t.limits.drive_min[0]) << t.limits.fine[0]
     more = t.slope[m.here.k[0] + 1] * along(m, end - m.here.input[0])
     last = along(m, m.here.output[0]) + more
-    usual = ((following if following < last else last) >> t.limits[FRACTION]) - t.limits[SHY]
-    least = (t.limits[OUTPUT_MIN] if rising else t.limits[OUTPUT_MAX]) << t.limits[FRACTION]
+    usual = ((following if following < last else last) >> t.limits.fraction[0]) - t.limits.shy[0]
+    least = (t.limits.output_min[0] if rising else t.limits.output_max[0]) << t.limits.fraction[0]
     if usual > m.step.next[0] and along(m, m.here.output[0] - least) >= 0:
         m.step.next[0] = usual if usual < most else most
 
@@ -57,10 +47,10 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: int) -> int:
     m.step.usual[0] = 0
     if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION], -FAR)
-        v = nearest(w, t.limits[FINE])
+        w, kink = solve(t, m, level << t.limits.fraction[0], -FAR)
+        v = nearest(w, t.limits.fine[0])
         inside = clamp_drive(t, v)
-        following = move_to_solution(t, m, kink, inside << t.limits[FINE])
+        following = move_to_solution(t, m, kink, inside << t.limits.fine[0])
         inverse_stay(m)
         m.step.bits[0] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
         if m.step.bits[0] == 0:
@@ -68,18 +58,18 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: int) -> int:
         m.step.reference[0] = u
         m.step.repeated[0] = 1
     m.step.status[0] |= m.step.bits[0]
-    return m.here.input[0] >> t.limits[FINE]
+    return m.here.input[0] >> t.limits.fine[0]
 
 
 @jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
     """Answer one sample."""
-    on = along(m, (u << t.limits[FRACTION]) - m.here.output[0])
+    on = along(m, (u << t.limits.fraction[0]) - m.here.output[0])
     if inverse_along(m, u) < m.step.next[0] and on > 0 and u != m.step.reference[0]:
         k = m.here.k[0] + 1
-        v = nearest(m.here.input[0] + along(m, divide_by_slope(t, on, k)), t.limits[FINE])
+        v = nearest(m.here.input[0] + along(m, divide_by_slope(t, on, k)), t.limits.fine[0])
         m.step.before[0] = m.here.input[0]
-        m.here.input[0] = v << t.limits[FINE]
+        m.here.input[0] = v << t.limits.fine[0]
         m.here.output[0] += t.slope[k] * (m.here.input[0] - m.step.before[0])
         m.step.reference[0] = u
         m.step.usual[0] = 1
@@ -100,7 +90,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: int) -> None:
     copy_place(m.here, m.undo)
     inverse_stay(m)
     m.step.repeated[0] = 0
-    move_to_input(t, m, v << t.limits[FINE])
+    move_to_input(t, m, v << t.limits.fine[0])
 
 
 @jit
@@ -119,7 +109,7 @@ def inverse_begin(t: FixedTables, m: FixedMemory, zero: int) -> None:
 @jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: int) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
-    move_to_input(t, m, v << t.limits[FINE])
+    move_to_input(t, m, v << t.limits.fine[0])
     copy_place(m.undo, m.here)
     inverse_stay(m)
 

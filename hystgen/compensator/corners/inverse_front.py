@@ -15,17 +15,7 @@ from hystgen.plays.corners.corners_float import (
     start,
     take_back,
 )
-from hystgen.plays.slots import (
-    DOMAIN,
-    HELD,
-    INPUT_CLAMPED,
-    OFFSET,
-    OUTPUT_CLAMPED,
-    OUTPUT_MAX,
-    OUTPUT_MIN,
-    REAL_MAX,
-    ZERO,
-)
+from hystgen.plays.slots import DOMAIN, HELD, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 
 @jit
@@ -65,18 +55,18 @@ inverse_choose = choosing(front_inverse)
 @jit
 def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
     """Answer one sample."""
-    if not (-t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX]):
+    if not (-t.limits.real_max[0] <= u <= t.limits.real_max[0]):
         return inverse_hold(t, m)
     inverse_keep(m)
     if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = u
-        if u < t.limits[OUTPUT_MIN]:
-            level = t.limits[OUTPUT_MIN]
-        elif u > t.limits[OUTPUT_MAX]:
-            level = t.limits[OUTPUT_MAX]
+        if u < t.limits.output_min[0]:
+            level = t.limits.output_min[0]
+        elif u > t.limits.output_max[0]:
+            level = t.limits.output_max[0]
         m.step.bits[0] = 0 if level == u else INPUT_CLAMPED
         m.step.reference[0] = u
-        w = plays_step(t.inverse, m, level - t.limits[OFFSET])
+        w = plays_step(t.inverse, m, level - t.limits.offset[0])
         v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
         m.step.bits[0] |= DOMAIN if limited else 0
@@ -96,8 +86,8 @@ def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
     """Replace the last answer by the drive that was actually applied."""
-    v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
-    if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
+    v = clamp_drive(t, applied) + t.limits.zero[0]  # no drive is -0
+    if not (-t.limits.real_max[0] <= applied <= t.limits.real_max[0]):
         m.step.status[0] |= HELD
         return
     if v != applied:
@@ -113,13 +103,13 @@ def inverse_commit(t: Tables, m: Memory, applied: Scalar) -> None:
 def inverse_begin(t: Tables, m: Memory, zero: int) -> None:
     """Set the start memory of the parameter file, or all plays to 0."""
     start(t.inverse, m, t.inverse_zero if zero else t.inverse_first)
-    m.step.last[0] = m.here.input[0] + t.limits[OFFSET]
+    m.step.last[0] = m.here.input[0] + t.limits.offset[0]
     move_to_output(t.inverse, m, t.begin[2 + zero])
     m.step.drive[0] = t.applied[2 + zero]
     m.step.ascending[0] = t.ascending[2 + zero]
     inverse_keep(m)
     m.step.returned[0] = m.step.drive[0]
-    m.step.reference[0] = t.limits[ZERO]
+    m.step.reference[0] = t.limits.zero[0]
     m.step.stepped[0] = 0
     m.step.committed[0] = 0
     m.step.repeated[0] = 0
@@ -133,7 +123,7 @@ def inverse_visit(t: Tables, m: Memory, v: Scalar) -> None:
     inverse_keep(m)
     inverse_replace(t, m, v)
     inverse_keep(m)
-    m.step.last[0] = m.here.input[0] + t.limits[OFFSET]
+    m.step.last[0] = m.here.input[0] + t.limits.offset[0]
 
 
 OPERATIONS = corners_of(inverse_begin, inverse_visit, inverse_step, inverse_commit)

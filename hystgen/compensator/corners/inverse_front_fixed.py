@@ -10,7 +10,7 @@ from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.corners_float import copy_place
 from hystgen.plays.fixed import code
-from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
+from hystgen.plays.slots import DOMAIN, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 inverse_choose = choosing(front_inverse)
 
@@ -28,7 +28,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: int) -> int:
     inverse_keep(m)
     if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION], m.step.next[0])
+        w, kink = solve(t, m, level << t.limits.fraction[0], m.step.next[0])
         v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
         m.step.bits[0] = 0 if level == u else INPUT_CLAMPED

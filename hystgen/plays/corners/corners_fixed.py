@@ -11,7 +11,7 @@ from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Flag, Int32, Int64, Struct
 from hystgen.plays.corners.corners_float import PlaceState
 from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
-from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepState
+from hystgen.plays.slots import Reals, StepState
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their smallest steps, are an int32_t in C
 
@@ -172,7 +172,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: int) -> int:
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
     """The input that gives `to`, an output beyond a kink along the move; at most slightly outside the range."""
     x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
-    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.here.rising[0] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    most = t.limits.play_max[0] + t.limits.margin[0] if m.here.rising[0] else t.limits.margin[0] - t.limits.play_min[0]
     return along(m, most if x > most else x)
 
 
@@ -217,7 +217,7 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) ->
 def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
     """Set a start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to the
     input at which that play begins to follow."""
-    aside = t.limits[OFFSET]
+    aside = t.limits.offset[0]
     m.here.depth[0] = 0
     for k in range(len(t.threshold) - 1, 0, -1):
         w = play[k if len(play) > 1 else 0]
