@@ -99,7 +99,7 @@ row("names_explain_most", "MOSTLY_EXPLAINED",  # far above the noise: 0.25 or 0.
     lambda *left: explain_most(left))
 row("names_explain_most_without_the_free_start_states", "",  # free start states left little to explain
     {0.33: False, 1.0: True}, lambda other: explain_most((0.3, 0.3), on_equal_terms=other))
-row("names_near_the_noise_explain_half", "LEAST_EXPLAINED",  # as multiples of it: leaves 0.32 or 0.58 of the variance above
+row("names_near_the_noise_explain_half", "LEAST_EXPLAINED",  # in multiples of it: leaves 0.32 or 0.58 of the variance
     {(2.5, 4.2): True, (2.9, 3.7): False},
     lambda left, gap: explain_most((left * NOISE, left * NOISE), gap * NOISE))
 row("equal_effects_come_in_the_order_of_the_catalogue", "FAR_LESS EQUAL",  # one leaves 0.3 or 0.9 % more in all
@@ -259,7 +259,7 @@ def kept(tried: Sequence[Any], refitted: Sequence[Any] = ()) -> list[str]:
 
 
 def followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> list[list[int]]:
-    """Steps that each option gets. `screen`: held-out and fitted errors; `joint`: held-out error after a joint search."""
+    """Steps of each option. `screen`: its held-out and fitted errors; `joint`: its held-out error after joint steps."""
     steps: list[list[int]] = [[] for _ in screen]
 
     class Pool:
