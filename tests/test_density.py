@@ -337,7 +337,7 @@ SLOW = {
     "fast oscillations": "+".join(f"1+sin({k}*r)" for k in range(900, 968)),
     "digits": "0." + "3" * 990 + "*r",
 }
-"""The slowest formulas of each kind that we found within the permitted length. Without a limit they took up to 20 min."""
+"""The slowest formulas of each kind found within the permitted length; without a limit they took up to 20 min."""
 
 
 @pytest.mark.slow(one_in=2)

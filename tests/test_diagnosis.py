@@ -313,7 +313,7 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
     ],
 )
 def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
-    """0.07 um of 0.5 um is left, with noise of 0.02 um. If no number of creep is at its end, two of its times are equal."""
+    """0.07 um of 0.5 um is left, with noise of 0.02 um. If no number of creep is at an end, two times are equal."""
     found = result("effects_found", ("creep",), 0.07, [])
     end = AtEnd("weights 2", 4.0, "largest", 3.0, 9.0 if why == "no less" else None, 0.07, why)
     named = dataclasses.replace(found.effects[0], at_an_end=True, ends=(end,))
@@ -599,7 +599,7 @@ def test_a_drive_at_rest_leaves_the_offset_free(place: float, bent: Effect, samp
 
 
 def test_a_shape_that_contains_a_simpler_one_goes_on_from_it(tmp_path: Path) -> None:
-    """It continues with the simpler shape's weights too, since those fitted with a straight sensor would not suit it."""
+    """It continues with the simpler shape's weights too, since those of a straight sensor would not suit it."""
 
     def made(number: int) -> Record:
         v = wander(number, turns=40)
@@ -746,7 +746,7 @@ def test_units_do_not_matter(codes: float, metres: float, tmp_path: Path) -> Non
 
 
 def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
-    """The stops are behind the plays and off centre: no front and no limit that is the same at both ends explains them."""
+    """The stops are behind the plays and off centre: no front and no limit that is equal at both ends explains them."""
     lower, upper, give = -5.0, 118.0, 0.3
     records = []
     for number in range(1, 7):
@@ -995,7 +995,7 @@ class TestNominalEffects:
 
     @pytest.mark.parametrize("level", [30.0, 33.0])
     def test_a_hard_limit(self, tmp_path: Path, level: float) -> None:
-        """A nominal limit that is right stays, although weights fitted without it stay below it, where it does nothing."""
+        """A correct nominal limit stays too, though weights fitted without it stay below it, where it does nothing."""
         records = self.records(lambda v: v, lambda y: np.minimum(y, 30.0))
         found = self.diagnosed(tmp_path, records, {"name": "saturation", "shape": "stops", "lower": -900.0,
                                                    "upper": level, "give": 0.0})  # fmt: skip
@@ -1225,7 +1225,7 @@ def test_numbers_far_from_where_drives_are_fast_are_found(tmp_path: Path, name: 
 
 
 def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the best effect is not sure because few blocks show it, one that is sure but explains far less is not named."""
+    """If the best effect is unsure because few blocks show it, one that is sure but explains far less is not named."""
 
     def step(*held_out: float) -> object:
         """Held-out error of the accepted effect, None if there is none; the first option is unsure, the second sure."""
@@ -1300,7 +1300,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
 
 @pytest.mark.thorough
 def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
-    """Another axis moves slowly during the fitted records but not during the held-out one, which hardly moves itself."""
+    """Another axis moves slowly during the fitted records but not during the held-out one, whose drive hardly moves."""
     records = []
     for number in (1, 2, 3):
         v = wander(number) if number < 3 else 49.5 + 0.01 * wander(number)
