@@ -1,9 +1,9 @@
 """Facts that the proofs assume about corner lists and states of effects, written into the emitted C as checks.
 
 Two of them relate numbers of the whole list, which Eva's value sets cannot express. The last plays of the blocks fall
-strictly from corner to corner, so there are no more corners than plays. And a sum of products, or a way, belongs to
-plays whose distance is limited, so it stays below the bound that the format was chosen by. Each check stands where the
-fact is needed: Eva assumes it, and a run stops where it fails.
+strictly from corner to corner, so there are no more corners than plays. And plays can only be so far apart, so sums of
+products and ways of the input stay below the bound that the format was chosen by. Each check stands where the fact is
+needed: Eva assumes it, and a run stops where it fails.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # RISE     self-heating adds no more in a sample than the highest temperature loses, which has RISE_BITS; one more bit
 #          is for rounding
 # RUBBED   a rubbing play stays between the extreme drives that it has seen
-# AMOUNT   hence no play moves by more than their distance in a step; the first n odd numbers add up to n^2
+# AMOUNT   hence it moves by at most the distance of those drives in a step; the first n odd numbers add up to n^2
 # INVERSE  a Newton step from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
 # PLAY     a viscous play moves towards the play without viscosity, so it stays between the start memory and the ends
 #          of the input; a play that would come too near to another stops in between

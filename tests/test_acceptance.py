@@ -442,7 +442,7 @@ def what_a_front_is_called(curve: Any) -> Any:
 # Thinning ----------------------------------------------------------------------------------------------------
 
 STRAIGHT = np.linspace(0.0, 100.0, 65)
-"""A drive."""
+"""A straight drive."""
 
 ODD = np.sqrt(2.0) * (np.arange(65) % 2)
 """An error in every other sample, with an rms of 1."""
@@ -780,7 +780,7 @@ LINE = Line(100.0, 1.0, 0.5, ("r",))
 
 
 def in_ten(size: Callable[[int], Any]) -> list[Array]:
-    """Errors of ten records with a line of 130 Hz, whose amplitude is `size` of the record's number."""
+    """Errors of ten records with a line of 130 Hz, of amplitude `size(k)` in record k."""
     return [hiss(2000, k) + tone(130.0, 2000, size(k)) for k in range(10)]
 
 

@@ -132,8 +132,8 @@ def test_cores_give_the_bits_of_a_drive_at_rest(name: str, arithmetic: str) -> N
 LAG = "name: lag, time_constant: 0.01"
 FAST = "name: creep, time_constants: [0.004, 0.015, 0.03], weights: [0.02, 0.03, 0.05]"
 SETTLED = {"q31": 700}
-"""[samples] Time until a drive has settled: ten of the slowest of these time constants and 100 more, so 400. In q31 the
-tail of the lead falls below a code of 2^32 only after twenty."""
+"""[samples] Time until a drive has settled, 400 if not listed: ten times the slowest of these time constants, and 100.
+In q31 it takes twenty times until the tail of the lead is less than a code of 2^32."""
 QUIETED = {
     "lag": chain("lag", LAG),
     "lag_and_creep": chain("lag_and_creep", LAG, FAST, front=TANH),
@@ -530,7 +530,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["led", "wider"])
 def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str, arithmetic: str) -> None:
-    """For other smooth references with plateaus, at other speeds, the error is within a factor of ten of the stated."""
+    """With other smooth references with plateaus, the error is within a factor of ten of the stated one."""
     one = model(name, {**CHAINS, **LED}[name])
     how = one.parameters.emit.compensation
     numbers, ends = compiled(one, arithmetic), one.cascade.input_range
@@ -802,7 +802,7 @@ def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: previ
 @pytest.mark.parametrize(("frequency", "damping"), MODES[:3])
 def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: float) -> None:
     """Against the recursion with the pole `exp(-w0 T)` twice: the mean delay is longer by at most part of a sample, the
-    gain at half the sample rate is no higher, and when the averages end the poles still miss 5 % of a step."""
+    gain at half the sample rate is no higher, and when the averages end the poles still miss over 5 % of a step."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by="notch")
     pole = math.exp(-2.0 * math.pi * frequency * T)
@@ -819,7 +819,7 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
 
 @pytest.mark.parametrize(("by", "left"), [("shaper", 0.147), ("notch", 0.135)])
 def test_a_mode_that_is_not_as_identified_rings(by: preview.By, left: float) -> None:
-    """A mode 10 % lower than identified rings by the share of a step that the docs state, one 10 % higher no more."""
+    """A mode 10 % too low rings by the share of a step that the docs state, and one 10 % too high by no more."""
     found = preview.taps(0.0, [Resonance(name="resonance", frequency=20.0, damping=0.02)], 1e-4, by=by)
     v = np.concatenate([[0.0], np.cumsum(found.weights[::-1]), np.ones(1500)])
     rings = []

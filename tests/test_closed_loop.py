@@ -325,7 +325,7 @@ def test_a_discrete_system_is_a_controller() -> None:
 
 @pytest.mark.thorough
 def test_figure_16_is_what_the_model_page_says() -> None:
-    """Largest errors of the second period. The note claims that either inverse is far better than none; it is not."""
+    """Largest errors of the second period. The note claims that both inverses far surpass none; they do not."""
     cases = {
         "none": (None, 0.102),
         "exact": (STAGE.inverse(), 0.136),
@@ -527,7 +527,7 @@ def test_codes_are_the_nearest_and_saturate() -> None:
 
 
 class Bang:
-    """A user's controller with memory that derives from no class."""
+    """A user's controller with memory and without a base class."""
 
     def __init__(self) -> None:
         self.resets, self.sum = 0, 0.0

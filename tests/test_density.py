@@ -472,7 +472,7 @@ def discrete_output(plays: Discretisation, v: list[float], start: float) -> floa
 
 
 def output_rounding(plays: Discretisation, r: list[float], p: list[float], v: list[float]) -> float:
-    """Roundings of both outputs: each adds a term for every play or place between kinks, with 20 roundings a term."""
+    """Roundings of both outputs: each adds a term per play or place between kinks, with at most 20 roundings a term."""
     places = len(v) * (len(v) + 3) // 2 + len(r)
     return (len(plays.weights) + places + 20) * U * r[-1] * (0.7 + max(p) * r[-1])
 

@@ -297,7 +297,7 @@ def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
 @pytest.mark.parametrize(
     ("items", "one", "speed"),
     [
-        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True, True),  # the way to the first end
+        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True, True),  # the way to the first end is left out
         ([sweep(120, 0, 100, 0, 100), sweep(0, 97, 4, 97, 4, seconds=1.2)], True, True),  # nearly the same loop
         ([sweep(0, 100, 0, 100), sweep(0, 100, 0)], True, True),
         ([sweep(0, 100, 0, 100, 50, 100, 0)], False, True),  # an inner loop

@@ -204,7 +204,7 @@ def test_finer_samples_give_the_same(effect: Effect) -> None:
     fine, dense = drive(120_001)
     kept = np.unique(np.concatenate([[0, len(fine) - 1], rng.integers(0, len(fine), 30_000)]))
     here, there = of(effect, fine[kept], dense[kept]), of(effect, fine, dense)[kept]
-    first_order = isinstance(effect, type(EVERY[2]))  # its rate is that of the step before
+    first_order = isinstance(effect, type(EVERY[2]))  # in the step: the rate is that of the sample before
     assert np.max(np.abs(here - there)) < (5e-3 if first_order else 3e-4) * np.ptp(there)
 
 
@@ -657,7 +657,7 @@ def test_relaxing_plays_against_the_ode(tau: float, exponent: float, tolerance: 
 
 @pytest.mark.parametrize("part", range(6))
 def test_any_relaxation_against_an_ode_solver(part: int) -> None:
-    """Slow to stiff relaxations over straight moves, some of them fast, against a solver that knows no plays."""
+    """Slow to stiff relaxations over straight moves, some of them fast, against a solver that is not told of plays."""
     from scipy.integrate import solve_ivp
 
     rng = np.random.default_rng(part)

@@ -35,7 +35,7 @@ from hystgen.verification import comparison, compilers, host, signals, sources
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
 DIALECTS = (["-std=c99"], ["-std=c11"], ["-x", "c++", "-std=c++17"])
-FIXED_PLACE = ["-fno-pic", "-fno-pie"]  # as firmware is built; otherwise constant pointers go into .data
+FIXED_PLACE = ["-fno-pic", "-fno-pie"]  # as firmware is built; otherwise constant pointers go into a data section
 OLDER = (["-std=gnu89"], ["-x", "c++", "-std=gnu++98"], ["-x", "c++", "-std=gnu++11"])
 
 
