@@ -1,4 +1,4 @@
-"""What a release says of itself: metadata, changelog, citation, and the workflow that publishes it."""
+"""Metadata, changelog and citation of a release, and the workflow that publishes it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_the_citation_agrees_with_the_metadata() -> None:
 
 
 def test_the_workflow_lints_clean(tmp_path: Path) -> None:
-    """Offline, with the strictest rules: actions pinned by commit, no credentials kept, least permissions."""
+    """Checked offline, with the strictest rules: actions pinned by commit, no credentials kept, least permissions."""
     options = ("--offline", "--no-config", "--persona", "pedantic")
     done = tool("zizmor", *options, ".github/workflows")
     assert done.returncode == 0, done.stdout

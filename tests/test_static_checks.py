@@ -1,4 +1,4 @@
-"""The static checks find what they are there to find, and look at every kind of module."""
+"""The static checks find planted defects and look at every kind of module."""
 
 from __future__ import annotations
 

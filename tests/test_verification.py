@@ -1,4 +1,4 @@
-"""Verification finds what it is there to find."""
+"""Verification finds the faults that it is meant to find."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_contraction_is_found_under_the_default_flags(compiler: str, changed_c: 
 
 @pytest.mark.parametrize("digit", ["0.4", "0.0119"])
 def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., None]) -> None:
-    """One unit in the last place of one number suffices."""
+    """A change of one number by one unit in the last place is enough."""
 
     def change(text: str) -> str:
         numbers = re.findall(r"(?<![\w.])\d+\.\d+(?:e[+-]?\d+)?f", text)
@@ -80,7 +80,7 @@ def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., N
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("curve", ["front", "back"])
 def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c: Callable[..., None]) -> None:
-    """Beside a break of a dead zone a piece of a curve is one code long, which no random record comes to."""
+    """Next to a break of a dead zone, a piece of a curve is one code long, which no random record reaches."""
     bent = model("bent")
     numbers = bent.tables("q31", "corners")
     assert isinstance(numbers, FixedTables)
@@ -252,7 +252,7 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
     levels = numbers.start_level if inverse else numbers.threshold
     moves = np.abs(np.diff(onto.astype(float)))
     known = np.min(np.abs(moves[:, None] - 2.0 * levels.astype(float)), axis=1) < 1e-5 * (high - low)
-    assert np.mean(known) > 0.9  # over again, by last bits, or just as far as a play needs
+    assert np.mean(known) > 0.9  # repeated, changed in the last bits, or moved just as far as a play needs
     assert np.mean(moves == 0) > 0.2
     assert np.mean(moves > 0.01 * (high - low)) > 0.2
     odd = records["NaN, infinities, extremes"][1]

@@ -1,6 +1,6 @@
-"""What a test of the numbers in `hystgen.diagnosis.search.acceptance` needs: the rows of its table, and their texts.
+"""Helpers for testing the numbers in `hystgen.diagnosis.search.acceptance`: the rows of its table, and their texts.
 
-A row names the numbers that decide it and lists, for a case just on either side of each, what its function answers.
+A row names the numbers that decide it and lists the answers of its function in cases just on either side of each.
 `tests/test_acceptance.py` holds the rows; `docs/thresholds.csv` lists them by number.
 """
 
@@ -52,7 +52,7 @@ ROWS: list[Row] = []
 
 
 def row(name: str, numbers: str, cases: Mapping[Any, Any], function: Callable[..., Any]) -> None:
-    """Add a row; `cases`: the answer by what the function is given, one argument or a tuple of them."""
+    """Add a row; `cases` maps the argument of the function, or a tuple of arguments, to its answer."""
     listed = ((key if isinstance(key, tuple) else (key,), answer) for key, answer in cases.items())
     ROWS.append(Row(name, tuple(numbers.split()), tuple(listed), function))
 
@@ -84,7 +84,7 @@ def also(test: Callable[..., None], numbers: str) -> None:
 
 
 def rows(number: str) -> list[Row]:
-    """Those that a number decides."""
+    """Rows that a number decides."""
     return [each for each in ROWS if number in each.numbers]
 
 
@@ -110,7 +110,7 @@ def texts() -> Iterator[tuple[list[str], str]]:
 
 
 def unit(name: str) -> str:
-    """The unit that stands before the text below a number; of several numbers with a text in common its own."""
+    """The unit at the start of the text below a number; if several numbers share the text, that of this one."""
     together, text = next(each for each in texts() if name in each[0])
     units = [part.partition("]")[0].removeprefix("[") for part in text.split(", [")]
     return units[together.index(name) if len(units) == len(together) else 0]
