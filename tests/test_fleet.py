@@ -41,7 +41,7 @@ P = np.array([0.3, 0.1, 0.1, 0.05, 0.04])
 
 
 def plant(k: int, samples: int = 20) -> tuple[Any, Any]:
-    """Drive and output of a unit: every weight differs a little from unit to unit."""
+    """Drive and output of a unit, whose weights differ a little from those of other units."""
     weights = P * np.random.default_rng(500 + k).normal(1.0, 0.03, len(P))
     v = wander(k, turns=30, samples=samples)
     return v, noisy(brute_output(v, R, weights, 0.0), 0.05, seed=k)
@@ -74,7 +74,7 @@ def rows(folder: Path) -> dict[str, dict[str, str]]:
 
 
 def by_hand(values: list[float]) -> list[float]:
-    """Modified z-scores with the standard library alone."""
+    """Modified z-scores, computed with the standard library alone."""
     middle = statistics.median(values)
     mad = statistics.median(abs(x - middle) for x in values)
     return [0.6745 * (x - middle) / mad for x in values]

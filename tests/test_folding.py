@@ -82,7 +82,7 @@ def types(function: c_ast.FuncDef) -> set[str]:
 
 
 def reads(node: c_ast.Node) -> Iterator[str]:
-    """Fields of `self` that are read."""
+    """Names of the fields of `self` that a node reads."""
     if isinstance(node, c_ast.Assignment) and node.op == "=":
         field = node.lvalue
         direct = isinstance(field, c_ast.StructRef) and isinstance(field.name, c_ast.ID) and field.name.name == "self"

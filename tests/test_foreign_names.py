@@ -57,7 +57,7 @@ def model(name: str) -> Model:
 
 
 def identifiers(text: str, own: str) -> set[str]:
-    """The identifiers of a C text without those that begin with `own` or the prefix of the run time."""
+    """The identifiers of a C text, except those that begin with `own` or the prefix of the run time."""
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
     text = re.sub(r"^#\s*(error|include|pragma)\b.*$", " ", text, flags=re.MULTILINE)
     text = re.sub(r'"[^"\n]*"|\'[^\'\n]*\'', " ", text)

@@ -218,9 +218,9 @@ def test_the_package_itself_imports_nothing() -> None:
     ("walk", "most"),
     [
         ("a recording's column v to weights", 29),
-        ("a weight to its digit in float32 C", 28),  # 3 of them explain the C, one declares memory by name
-        ("a sample through the bit reference", 6),  # one of them runs the calls of every engine
-        ("a recording to a named effect", 68),  # 8 of them put the inverse in front of the plain model
+        ("a weight to its digit in float32 C", 28),  # 3 of these files explain the C, one declares memory by name
+        ("a sample through the bit reference", 6),  # one of these files runs the calls of every engine
+        ("a recording to a named effect", 68),  # 8 of these files put the inverse in front of the plain model
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:
@@ -252,7 +252,7 @@ BOUNDS = {
 
 
 def texts(folder: Path, endings: Sequence[str]) -> dict[Path, str]:
-    """Files of a folder with these endings, and their text."""
+    """The files of a folder with these endings, and their text."""
     return {path: path.read_text(encoding="utf-8") for end in endings for path in sorted(folder.rglob(f"*{end}"))}
 
 

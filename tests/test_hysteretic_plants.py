@@ -376,7 +376,7 @@ def test_duhem_is_its_equation(allowed: list[float]) -> None:
 
     expected, error = over_input(lambda x, y, s: rising(x, y) if s > 0 else falling(x, y), v, 0.4, 1e-12)
     found = plants.Duhem(rising, falling, 0.4).simulate(v)
-    # moves bring outputs together
+    # moves bring outputs together, so errors do not grow
     np.testing.assert_allclose(found, expected, rtol=0, atol=sum(allowed) + error)
 
 
@@ -473,7 +473,7 @@ def test_maxwell_slip_is_every_element_for_itself_and_a_play_sum() -> None:
 
 
 def relays(v: Array, alpha: Array, beta: Array, weights: Array) -> Array:
-    """Relays one by one, all down before the first sample."""
+    """Sum of relays, computed one by one; all are down before the first sample."""
     up = np.zeros(len(alpha), dtype=bool)
     found = []
     for x in v:

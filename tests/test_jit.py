@@ -113,7 +113,7 @@ def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(jitting, "_samples", Counter())
     some = jitting.SHORT // 2
     assert not as_python(jitting.SHORT + 1)
-    with jitting.plain():  # which runs as Python anyway
+    with jitting.plain():  # inside it, all samples run as Python
         assert as_python(jitting.SHORT + 1)
         assert all(as_python(some) for _ in range(3))
     assert [as_python(some) for _ in range(3)] == [True, True, False]

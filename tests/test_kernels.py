@@ -123,7 +123,7 @@ def c_kernels(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., SimpleN
         library = folder / f"{compiler}_{name}_{optimisation[1:]}.so"
         flags = ["-std=c99", optimisation, "-ffp-contract=off", "-fPIC", "-shared", f"-I{RUNTIME}", *real_flags(name)]
         if compiler == "zig":
-            flags.append("-fno-sanitize=undefined")  # zig adds it to -O0
+            flags.append("-fno-sanitize=undefined")  # zig adds the sanitizer to -O0
         files = [str(folder / "driver.c"), *(str(source(kernel, name)) for kernel in KERNELS)]
         run([*command(compiler), *flags, *files, "-o", str(library)])
         ffi = cffi.FFI()
@@ -268,7 +268,7 @@ def sweep(
     t = TABLES[kernel]["float32"]
 
     def part(start: int) -> tuple[float, int, int, int]:
-        stop = min(start + (block + 1) * stride, end)  # one shared with the next block, for the comparison of y
+        stop = min(start + (block + 1) * stride, end)  # one sample is shared with the next block, to compare y
         x = np.arange(start, stop, stride, dtype=np.uint32).view(np.float32)
         return compiled(kernel).judge(x, c(x), t)
 

@@ -349,7 +349,7 @@ def test_width_is_that_of_the_largest_loop(pi: PI, middle: list[float]) -> None:
 
 @given(play_sums(), turns)
 def test_bounds_of_the_output(pi: PI, course: list[float]) -> None:
-    """Every output lies in `output_range`, that within (30), and that within (31)."""
+    """Every output lies in `output_range`, which lies within (30), which lies within (31)."""
     v_max = reach(pi)
     v = v_max * np.array(course)
     model = Cascade(pi, (), 0.0, (-v_max, v_max))
@@ -415,7 +415,7 @@ def test_models_and_inverses_do_not_know_the_rate(model: Cascade, course: list[f
 
 @given(play_sums(), turns, turns)
 def test_a_larger_sweep_wipes_out_the_smaller(pi: PI, before: list[float], after: list[float]) -> None:
-    """What happened inside a range leaves no trace once the drive has run through the range."""
+    """Moves inside a range leave no trace once the drive has run through the range."""
     v = reach(pi)
     inside = 0.9 * v * np.array(before)
     end = v * np.array(after)

@@ -41,7 +41,7 @@ def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
 
 
 def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: int = 0) -> tuple[int, int]:
-    """The answer of a search in fixed point, and its tries."""
+    """The answer of a search in fixed point, and its number of tries."""
     tries = [0]
 
     def sum_at(_: Any, state: Any, w: int) -> int:
@@ -143,8 +143,8 @@ class Exact:
         x, found = self.play[0], [self.play[0]]
         for r, wider, q in list(zip(self.r, self.wider, self.play, strict=True))[1:]:
             for side in (1, -1):  # which end of the play's band is at q
-                for way in (1, -1):  # of the input
-                    slope = way - side * wider  # of that end over the move's size
+                for way in (1, -1):  # direction of the input
+                    slope = way - side * wider  # of that end, per unit of the move
                     move = (q - x + side * r) / slope if slope else Fraction(-1)
                     if move > 0:
                         found.append(x + way * move)
@@ -189,7 +189,7 @@ def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
             u = np.array([rng.uniform(-8.0, 8.0) * rng.choice([1.0, 0.1])], real)
             code.run(t, s, call, u, np.zeros(1, real), status)
             if k < 2:
-                continue  # at rest, or about to be moved for the first time
+                continue  # plays are at rest, or about to be moved for the first time
             exact = Exact(t, s)
             for kink in exact.kinks():
                 at = real(float(exact.total(kink)))

@@ -153,7 +153,7 @@ def test_at_one_speed_right_names_stand(stage: Stage, name: str) -> None:
     assert all(each["kind"] != "not_a_play_sum" for each in found.content["unexplained"])
 
 
-# Each inverse in front of the other model --------------------------------------------------------------------
+# The inverse of each model in front of the other -------------------------------------------------------------
 
 
 def crossed(time_constant: float) -> harm.Wild | None:

@@ -54,7 +54,7 @@ def measured(one: Model) -> float:
     moved[330] += 1e-6
     with jit.plain():
         plain, other = (answers(numbers, Run(np.arange(n) * T, each, {}), True) for each in (u, moved))
-    end = n - 8  # then the reference stops and repeats its last sample
+    end = n - 8  # after it the reference stops and repeats its last sample
     assert np.max(np.abs(plain[:end])) < 4.0, "nothing is limited"
     gain = np.abs(np.fft.rfft((other - plain)[:end], 1 << 15)) / 1e-6
     return float(np.max(gain)) * one.cascade.pi.slopes[-1]

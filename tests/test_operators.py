@@ -1,4 +1,4 @@
-"""Operators and memory against brute force and against the identities of the literature."""
+"""Operators and memory, compared with brute force and with identities of the literature."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ def test_c_gives_the_bits_of_the_reference_in_every_arithmetic(tmp_path: Path, a
 
 
 def test_the_noise_gain_is_that_of_an_impulse(tmp_path: Path) -> None:
-    """Without plays everything is linear."""
+    """Without plays, the whole chain is linear."""
     path = written(tmp_path, DROOP, FOLLOWER)
     path.write_text(path.read_text().replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"))
     one = hystgen.load(path, [EXAMPLE, outside(tmp_path)])
@@ -431,7 +431,7 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
     assert not (tmp_path / "out").exists()
 
 
-SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
+SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # solve returns the drive itself
 ONLY_FLOAT = {
     "another input": ([SOFT], "its solve does not return the input for which absorb returns the requested output"),
     "memory": ([("    return s[0] + product", "    s[1] = y\n    return s[0] + product"),

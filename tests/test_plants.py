@@ -61,7 +61,7 @@ Made = Callable[[str, int], case.Case]
 
 
 class TestApart:
-    """The generator knows nothing of the package, and the workflow nothing of the labels."""
+    """The generator does not use the package, and the workflow does not see the labels."""
 
     def test_names_are_the_catalogue(self) -> None:
         from hystgen.parameters.checks import EFFECT_NAMES

@@ -150,7 +150,7 @@ CALL = "        case {}: {}; break;\n"
 
 
 def chain_driver(one: Model, arithmetic: str) -> str:
-    """Every call of both operators of a model with effects, in any order with any codes."""
+    """A driver that makes every call of both operators of a model with effects, in any order with any codes."""
     name = one.name
     calls = module.of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained")).calls
     cases = [
@@ -184,7 +184,7 @@ def model(name: str) -> Model:
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
-    """Emits the module with its driver; returns its C file."""
+    """Emit the module with its driver; return its C file."""
     one = model(name)
     hystgen.emit(one, folder, operator="both", arithmetic=arithmetic, engine=engine)
     source = folder / f"{name}.c"
@@ -219,7 +219,7 @@ def alarms(source: Path, machine: str) -> list[str]:
         [
             frama_c(), *MACHINES[machine], "-warn-signed-downcast", *(["-warn-unsigned-overflow"] if not wraps else []),
             "-eva", "-eva-precision", "0", "-eva-no-print", "-eva-domains", "symbolic-locations",
-            "-eva-widening-delay", str(12 if f"{name}_loop_rest(" in text else plays + 6),  # until as many corners
+            "-eva-widening-delay", str(12 if f"{name}_loop_rest(" in text else plays + 6),  # one for each corner
             "-eva-auto-loop-unroll", str(plays + 2), "-eva-plevel", "400",
             "-eva-slevel-function", ",".join(visits),
             source.with_name("driver.c"), source,

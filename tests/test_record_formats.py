@@ -490,7 +490,7 @@ def test_a_table_of_many_columns_takes_seconds(tmp_path: Path, kind: str) -> Non
             file.write(",".join([*own, *cells]) + "\n")
     started = time.process_time()
     record = read_record(tmp_path / "a.csv")
-    # 1 to 3 s; before names were counted in one pass it took a minute
+    # this takes 1 to 3 s; it took a minute before names were counted in one pass
     assert time.process_time() - started < 15.0
     check(record)
     assert len(record.extra) == (0 if kind == "text" else MANY)
@@ -536,7 +536,7 @@ def test_without_the_library_of_a_format(
 
 
 def test_more_samples_than_memory(tmp_path: Path) -> None:
-    """A file of a few bytes can claim any length: HDF5 stores nothing for values that were never written."""
+    """HDF5 stores nothing for values that were never written, so a file of a few bytes can claim any length."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name in "tvy":
             file.create_dataset(name, shape=(1 << 50,), chunks=(1 << 20,), dtype="f8")
@@ -687,7 +687,7 @@ def test_units_in_headers(header: str, name: str, unit: str) -> None:
 
 @every_format
 def test_names_with_units_are_understood(tmp_path: Path, name: str, write: Callable[..., None]) -> None:
-    # MATLAB's names are words
+    # MATLAB allows letters, digits and underscores in names
     columns = {"t_s": T, "v_V": V, "y_um": Y, "temperature_degC": T}
     if "mat" not in name and name != "A.HDF5":
         columns = {"t [s]": T, "v [V]": V, "y (um)": Y, "temperature [degC]": T}
@@ -867,7 +867,7 @@ def awkward(samples: int) -> list[list[str]]:
     """Numbers that a decimal reader gets wrong if it rounds twice, and all kinds of digits."""
     rng = np.random.default_rng(5)
     values = rng.integers(0, 2**63, samples * 2, dtype=np.uint64).view(np.float64)
-    values = np.where(np.abs(values) < LARGEST, values, 1.0)  # others stand for no value
+    values = np.where(np.abs(values) < LARGEST, values, 1.0)  # larger numbers stand for missing values
     texts = [repr(x) for x in values.tolist()]
     hard = ["9007199254740993", "1.00000000000000011102230246251565", "2.2250738585072011e-308", "4.9e-324", "+1.5E-3",
             ".5", "7.", "0.1e1", "12345678901234567890.1234567890", "8.988465674311580e-307"]  # fmt: skip
@@ -899,7 +899,7 @@ def test_both_ways_through_a_block_round_as_python_does(tmp_path: Path) -> None:
 
 
 def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The places reported are those of the file, whichever blocks they are in."""
+    """The places reported are those in the file, whichever blocks they are in."""
     monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5)), "ok"] for k in range(2000)]
     header = "t,v,y,state"

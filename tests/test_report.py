@@ -70,7 +70,7 @@ def spoilt() -> Record:
 
 
 def place(samples: tuple[int, ...]) -> list[int]:
-    """Where samples of the whole record are in the one with a gap."""
+    """Indices of samples of the whole record in the record with a gap."""
     return [k if k < CUT else k - (CONTINUED - CUT) for k in samples]
 
 

@@ -99,10 +99,10 @@ def _short(rng: np.random.Generator, slow: bool) -> Session:
 @pytest.mark.parametrize(
     ("kind", "seed", "names"),
     [
-        ("foreign", 6, []),  # room temperature on the gain, which was named thermal
-        ("foreign", 8, []),  # a slow line of crosstalk, named saturation and creep
+        ("foreign", 6, []),  # room temperature on the gain, once named thermal
+        ("foreign", 8, []),  # a slow line of crosstalk, once named saturation and creep
         ("single", 1, ["rate_dependence"]),
-        ("pair", 1, ["ageing", "lag"]),  # named rate dependence and ageing
+        ("pair", 1, ["ageing", "lag"]),  # once named rate dependence and ageing
     ],
 )
 def test_what_was_named_wrongly(kind: str, seed: int, names: list[str], tmp_path: Path) -> None:

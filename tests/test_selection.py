@@ -177,7 +177,7 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
     ]
     best: Any
     best, unchanged = selection._exchanged(now, [*found], {}, {"b", "c", "w"}, world.records)
-    assert best is now  # without `a` there is nothing better
+    assert best is now  # without `a`, nothing better is found
     assert [each.name for each in unchanged] == ["w", "c"]
     best, found = selection._exchanged(now, found, {}, {"a", "b", "c", "w"}, world.records)
     assert best.names == frozenset("ab")
@@ -297,7 +297,7 @@ OF_MADE: Any = SimpleNamespace(
 @pytest.mark.parametrize(
     ("name", "free", "left", "way"),
     [
-        ("other", 1, (1.1, 1.1), True),  # fewer numbers, and no separation
+        ("other", 1, (1.1, 1.1), True),  # fewer numbers, and records do not separate the two
         ("other", 1, (1.1, 1.3), False),
         ("other", 1, (1.3, 1.1), False),
         ("other", 5, (0.9, 0.9), False),  # more numbers: the records have to separate it
@@ -307,7 +307,7 @@ OF_MADE: Any = SimpleNamespace(
         ("other", 3, (1.02, 0.97), True),  # equal over all records: the smaller held-out error
         ("other", 3, (0.98, 1.02), False),
         ("other", 3, (0.9, 1.06), False),  # held-out records separate the two
-        ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
+        ("one", 5, (0.9, 0.9), True),  # another shape of the same effect
         ("one", 3, (0.98, 0.98), False),
         ("one", 1, (1.1, 1.1), False),
     ],
@@ -325,7 +325,7 @@ def test_of_those_that_it_gives_way_to_the_last(monkeypatch: pytest.MonkeyPatch)
     found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
     assert found is not None
     assert found.best is other
-    simple = made("one", 3, (0.81, 0.81))  # a shape of its own that needs as few numbers, and leaves less
+    simple = made("one", 3, (0.81, 0.81))  # another shape of the effect, with as few numbers, that leaves less
     step = selection._Step(None, [shape, simple, other], shape, step.merit)  # type: ignore[arg-type]
     found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
     assert found is not None
@@ -641,7 +641,7 @@ ABOUT = About((0.0, 100.0), 10.0, 1e-3, 1.0, 1.0, 1e4, 1e3, (0.0, 10.0, 20.0), f
 @pytest.mark.parametrize(
     ("kind", "shape", "at", "key", "farthest"),
     [
-        (RelaxingPlays, 1, 1, "exponent", 10.0),  # the schema's largest
+        (RelaxingPlays, 1, 1, "exponent", 10.0),  # the largest that the schema allows
         (ExponentialCreep, 0, 1, "weights", None),
         (PartMode, 0, 2, "share", 1.0),
     ],
@@ -678,7 +678,7 @@ def test_a_wider_range_ends_where_the_schema_does(
     [
         (0.97, ["lag"], 0.1, False),  # held-out records hardly prefer no front
         (0.9, ["lag"], 0.4, True),
-        (0.9, ["lag", "asymmetry"], 0.4, False),  # a front is found again, and does worse in the end
+        (0.9, ["lag", "asymmetry"], 0.4, False),  # a front is found again, which does worse in the end
         (0.9, ["lag", "asymmetry"], 0.2, True),
         (0.9, [], 0.4, False),
     ],

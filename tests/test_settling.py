@@ -1,4 +1,4 @@
-"""Settling after a step, against closed forms, scipy's linear systems and a step on a fine even grid."""
+"""Settling after a step, compared with closed forms, scipy's linear systems and a step on a fine even grid."""
 
 from __future__ import annotations
 

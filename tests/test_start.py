@@ -24,7 +24,7 @@ WEIGHTS = (1.0, *(0.2 * np.exp(-np.arange(9) / 4.0)).tolist())
 
 @pytest.fixture(scope="module")
 def bench() -> ModuleType:
-    """benchmarks/start_memory.py"""
+    """The module benchmarks/start_memory.py."""
     path = Path(__file__).resolve().parents[1] / "benchmarks" / "start_memory.py"
     spec = importlib.util.spec_from_file_location("bench_start_memory", path)
     assert spec

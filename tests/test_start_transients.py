@@ -123,7 +123,7 @@ def test_weights_beside_limited_start_responses_are_the_best(strength: float, be
 
 @pytest.mark.parametrize("seed", [9, 268, 274, 1, 2])
 def test_nearly_equal_responses(seed: int) -> None:
-    """Two nearly equal responses have large factors of opposite signs; the first estimates go from side to side."""
+    """Nearly equal responses have large factors of opposite signs, which go from side to side for the first seeds."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-1.5, 0.5) + np.array([0.0, rng.uniform(0.02, 0.3)])
     shape = np.array([*places, *10.0 ** rng.uniform(-3.0, -1.0, 2)])
@@ -175,7 +175,7 @@ def test_derivatives_follow_the_limits() -> None:
 
 
 def test_a_start_behind_a_sensor_has_the_same_limits() -> None:
-    """A sensor bends the response too: its offset is found with it, which must not double what the limits allow."""
+    """A sensor bends the response too, with an offset that is found; this must not double what the limits allow."""
     bent = kept(SensorPolynomial(name="sensor_nonlinearity", coefficients=(0.1,), scale=150.0))
     straight = kept(SensorPolynomial(name="sensor_nonlinearity", coefficients=(1e-9,), scale=150.0))
     with jit.plain():

@@ -307,7 +307,7 @@ def test_output_range_is_what_histories_can_reach(name: str) -> None:
 
 
 def test_saturation_does_not_corrupt_the_memory() -> None:
-    """After references far beyond the range the plant follows exactly as soon as they come back."""
+    """After references far beyond the range, the plant follows exactly as soon as they return."""
     model = load("plain")
     low, high = model.output_range
     k = np.linspace(0, 12 * np.pi, 3000)

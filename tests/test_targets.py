@@ -45,7 +45,7 @@ def model(name: str) -> Model:
 
 @pytest.fixture
 def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[[str], str]], None]:
-    """Lets a test change the emitted file of that ending before it is compiled."""
+    """Let a test change the emitted file with this ending before it is compiled."""
     emitted = module.files
 
     def change(ending: str, how: Callable[[str], str]) -> None:
@@ -62,7 +62,7 @@ def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[[str],
 
 @pytest.fixture(scope="module")
 def bench() -> ModuleType:
-    """benchmarks/targets.py"""
+    """The module benchmarks/targets.py."""
     path = Path(__file__).resolve().parents[1] / "benchmarks" / "targets.py"
     spec = importlib.util.spec_from_file_location("bench_targets", path)
     assert spec
@@ -189,7 +189,7 @@ def frames_and_calls(compiler: cross.CrossCompiler, source: Path) -> tuple[dict[
             for entry in section.iter_relocations() if caller in frames else ():
                 kind = {10: "", 30: "jump "}.get(entry["r_info_type"])  # R_ARM_THM_CALL, R_ARM_THM_JUMP24
                 symbol = symbols.get_symbol(entry["r_info_sym"])
-                if kind is not None:  # two functions with the same code may be one, in the section of either
+                if kind is not None:  # functions with the same code may be merged, in the section of either
                     known = symbol["st_shndx"] != "SHN_UNDEF"
                     name = elf.get_section(symbol["st_shndx"]).name.removeprefix(".text.") if known else symbol.name
                     calls[caller].add(kind + whole(name))
@@ -253,7 +253,7 @@ def stack(
             frames, calls = frames_and_calls(cross.find(target, compiler), source)
             called = {each.removeprefix("jump ") for every in calls.values() for each in every}
             assert len(called) > 2
-            assert all(each.startswith("__aeabi_") for each in called - frames.keys())  # divides, where a gain is set
+            assert all(each.startswith("__aeabi_") for each in called - frames.keys())  # division, where a gain is set
             used[operator, compiler] = max(deepest(each, frames, calls) for each in frames)
     return used
 
@@ -534,7 +534,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
     call = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT, slots.OP_STEP] * 5, dtype=np.uint8)
     core.run("naked", "forward", call, np.zeros(20, dtype=np.float32))
     assert core.counts.tolist() == [4] * 10
-    assert 0 < core.stack <= 16  # the reset's, which calls a step that needs none
+    assert 0 < core.stack <= 16  # stack of the reset, which calls a step that needs none
 
 
 def test_counts_are_the_same_in_two_runs() -> None:
@@ -569,7 +569,7 @@ def test_counts_agree_with_those_known_for_the_textbook_loop(
 def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
     """By formula (35), there are as many different groups of plays, each with the drive at which it was left."""
     found = []
-    for points in list(bench.corner_lists(16))[::2]:  # each also upside down
+    for points in list(bench.corner_lists(16))[::2]:  # the others are the same upside down
         r = np.asarray(bench.model(16).cascade.pi.thresholds)[1:]
         plays = np.full(16, points[0])
         for x in points:

@@ -266,7 +266,7 @@ def test_names_of_ours_come_before_meanings(tmp_path: Path) -> None:
     assert record.v.tolist() == list(range(N))
     assert list(record.extra) == ["drive"]
     check(read_record(tmp_path / "a.csv", {"v": "drive"}))
-    # Not needed, so not looked for
+    # y is not needed, so it is not looked for
     record = read_record(put(tmp_path / "b.csv", "t,v,position,k", *rows), need=("v",))
     assert record.y is None
     assert list(record.extra) == ["position", "k"]
@@ -343,7 +343,7 @@ def test_dates_that_may_be_read_in_two_ways(tmp_path: Path) -> None:
     lines = [f"0{4 + k // 30}/03/2024 {(23 + k // 30) % 24:02}:00:{k:02},{row}" for k, row in enumerate(rows)]
     (problem,) = problems(put(tmp_path / "a.csv", "time,v,y", *lines))
     assert "may begin with the day or with the month" in problem
-    # With a point the day comes first everywhere
+    # With points, the day comes first everywhere
     lines = [line.replace("/", ".") for line in lines]
     record = read_record(put(tmp_path / "b.csv", "time,v,y", *lines))
     assert record.t[30] == 3630.0

@@ -52,7 +52,7 @@ def item(v: Array, left: Array, name: str = "made") -> Item:
 
 
 def needed(v: Array, left: Array) -> NDArray[np.intp]:
-    """Places of the samples that are needed."""
+    """Indices of the samples that are needed."""
     (mask,) = needed_samples([item(v, left)], [left], NOISE)
     return np.flatnonzero(mask)
 

@@ -63,7 +63,7 @@ def test_the_whole_model_leaves_the_noise_and_plays_alone_the_creep() -> None:
 
 
 def solved(y: float, states: list[float]) -> float:
-    """The drive in range at which the plays of `TEXT` alone give y or are nearest to it, by bisection."""
+    """The drive in range at which the plays of `TEXT` alone give y, or come nearest to it, by bisection."""
     r, p = (0.0, 4.0, 10.0, 20.0, 35.0), (0.15, 0.02, 0.02, 0.02, 0.01)
     low, high = 0.0, 100.0
     for _ in range(80):
@@ -99,7 +99,7 @@ def test_a_model_without_effects_is_its_plays() -> None:
 
 
 class TestLimited:
-    """Drives that an end of the range really changed, counted beside a model whose range is wide."""
+    """Only drives that an end of the range really changed are counted."""
 
     STATIC = TEXT.partition("  effects")[0]
     LAGS = TEXT + "    - {name: lag, time_constant: 0.02}\n"

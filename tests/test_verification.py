@@ -31,7 +31,7 @@ def model(name: str) -> Model:
 
 @pytest.fixture
 def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[str], str]], None]:
-    """Lets a test change the emitted `NAME.c` before it is compiled."""
+    """Let a test change the emitted `NAME.c` before it is compiled."""
     emitted = module.files
 
     def change(how: Callable[[str], str]) -> None:
@@ -128,7 +128,7 @@ def test_a_compiler_that_is_asked_for_and_missing_is_a_failure(monkeypatch: pyte
 
 
 def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Distributors set CC='ccache gcc'; the first word is what has to be there."""
+    """Distributors set CC='ccache gcc'; only the first word has to be installed."""
     launcher = tmp_path / "ccache"
     launcher.write_text(f'#!/bin/sh\necho "$@" >> "{tmp_path}/calls"\nexec "$@"\n')
     launcher.chmod(0o755)
@@ -176,7 +176,7 @@ def test_compilers_keep_their_temporary_files_where_the_output_goes(tmp_path: Pa
 def test_where_temporary_files_may_not_be_executed_a_library_is_loaded_from_elsewhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As with a TMPDIR that is mounted noexec: there the loader fails with these words."""
+    """In a TMPDIR that is mounted noexec, the loader fails with these words."""
     blocked, free = tmp_path / "tmp", tmp_path / "run"
     blocked.mkdir()
     free.mkdir()

@@ -34,7 +34,7 @@ OUTSIDE["PYTHONNOUSERSITE"] = "1"
 
 
 def run(*command: object, folder: Path, code: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run a program in `folder`; it exits with `code`."""
+    """Run a program in `folder` and check that it exits with `code`."""
     done = subprocess.run(
         list(map(str, command)), cwd=folder, env=OUTSIDE, capture_output=True, text=True, check=False
     )

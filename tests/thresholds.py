@@ -27,7 +27,7 @@ HEAD = ("number", "value", "unit", "decides")
 
 @dataclass(frozen=True)
 class Row:
-    """A function, its answer in each case, and the numbers whose double and half change an answer."""
+    """A function, its answer in each case, and the numbers that change an answer when doubled or halved."""
 
     name: str
     numbers: tuple[str, ...]
@@ -89,7 +89,7 @@ def rows(number: str) -> list[Row]:
 
 
 def names() -> list[str]:
-    """All numbers, in their order."""
+    """Names of all numbers, in their order."""
     found = vars(acceptance).items()
     return [name for name, value in found if name.isupper() and isinstance(value, int | float | tuple)]
 
@@ -102,7 +102,7 @@ def changed(value: Any, factor: float) -> Any:
 
 
 def texts() -> Iterator[tuple[list[str], str]]:
-    """Numbers that are assigned together, and the text below them."""
+    """Names of numbers that are assigned together, and the text below them."""
     for each, text in itertools.pairwise(ast.parse(Path(acceptance.__file__).read_text(encoding="utf-8")).body):
         if isinstance(each, ast.Assign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
             targets = [name.id for name in ast.walk(each.targets[0]) if isinstance(name, ast.Name)]
