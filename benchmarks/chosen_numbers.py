@@ -139,8 +139,8 @@ def unknown() -> None:
 
 
 def exact() -> None:
-    """Largest change between held samples, and bend between interpolated ones, that rounding to digits leaves, /
-    range."""
+    """Largest change of held samples and largest bend of interpolated ones after rounding to digits, as shares of the
+    output's range."""
     print("exact: written with digits, offset / range, largest change where nothing was measured: held, interpolated")
     t = np.arange(4001)
     slow = np.arange(0, 4001, 8)
@@ -158,7 +158,8 @@ def exact() -> None:
 
 
 def lengths() -> None:
-    """What the error of a play sum on rate-independent plants goes with, and that of a stage that creeps."""
+    """Shares of a play sum's error explained without and with rates, on three rate-independent plants and one with
+    creep."""
     print("lengths: plant, error explained without rates / with them, by averages over 0, 2, 3, 4, 6 and 11 distances")
     t = 1e-3 * np.arange(12000)
     v = 4.0 * np.exp(-0.15 * t) * np.sin(2.0 * np.pi * (0.7 * t + 0.05 * t**2))

@@ -4,10 +4,10 @@
 
 Code is that of a module at -O2, the larger of zig and gcc (RISC-V: zig only); instructions are the mean over a slow
 sine in a strict -O2 build of zig, of the inverse, or of the forward operator for parts that only it has. `any` is what
-any effect adds, measured with a gain, the cheapest one (`any_corners`: code with engine corners); all other rows are
-differences. `dilated` is common to all models whose plays a search finds, and their other parts are measured beyond it;
-`braked` is what a lag and a slew limit together take beyond their sum, `quiet` what it takes beyond a lag.
-`effect_sizes.csv`, the source of figures in the banner of emitted files, has the code on the two cores of
+any effect adds, measured with a gain, the cheapest one (`any_corners`: code with engine corners); the other rows have
+the difference from that, which may be negative. Plays that a search finds have `dilated` in common, and their rows have
+what they take beyond it; `braked` is what a lag and a slew limit together take beyond their sum, `quiet` what it takes
+beyond a lag. `effect_sizes.csv`, the source of figures in the banner of emitted files, has the code on the two cores of
 `hystgen.compensator.engines`; `docs/effects.csv` has all cores.
 """
 
