@@ -585,7 +585,7 @@ SLIP_RESOLVED = 7.0
 stand still in one of a hundred. Derived."""
 
 SLIP_STRETCH = 0.5, 3.0
-"""[times the motion of `SLIP_RESOLVED`] Least and largest motion of a stretch that counts. Changed by:
+"""[times that motion] Least and largest motion of a stretch that counts. Changed by:
 acceptance::how_much_stands."""
 
 SLIP_OFF = 0.6
