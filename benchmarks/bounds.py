@@ -1,16 +1,16 @@
-"""Measure how much of the stated bounds of models with effects a search reaches: drawn models, every arithmetic.
+"""Measure how much of its stated error bounds a search reaches, for random models with effects in every arithmetic.
 
     python benchmarks/bounds.py [--seeds 0:3] [--arithmetic float32,q15] [--effects creep,viscous] [--tries 40]
 
-For each effect the models of these seeds, and of each the largest error of either operator that a search finds: drives
-of sweeps, holds, jumps, noise, and shaking by the fastest step that bounds hold for; then the worst of them with
-another end, again and again. The inverse is asked for where the model has been with such a drive. Exact is what the
-double model answers, forwards `model.simulate`, backwards `hystgen.compensator.chained`, which share no tables with the
-C, but for the verbs of lag and creep; where a bound holds for compensators that have seen the same drives, the tables
-in double precision, to which the drives are committed that were sent. A line is printed for each operator: the largest
-and the median of bound over error, and the number of bounds that were exceeded, which has to be 0.
+For each effect and seed, a search looks for the largest error of either operator. Its drives consist of sweeps, holds,
+jumps, noise, and shaking at the fastest step for which the bounds hold; later it varies the end of the worst drive so
+far. The inverse gets the output of the model for such a drive as its reference. Exact answers come from the double
+model, `model.simulate` forwards and `hystgen.compensator.chained` backwards, which share no tables with the C except
+for the verbs of lag and creep. Where a bound holds for compensators that have seen the same drives, they come from the
+tables in double precision, to which the sent drives are committed. A line is printed for each operator: the median and
+the largest ratio of bound to error, and the number of exceeded bounds, which has to be 0.
 
-A search finds less than there is: a ratio says how slack a bound is at most.
+A search may miss the largest error, so a ratio only limits the slack of a bound from above.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ Array = NDArray[np.float64]
 Generator = np.random.Generator
 
 T, LENGTH = 1e-3, 600
-"""[s, samples] Sample time and length of a record. Time constants above are chosen in samples, so that the first sets
-units only. Longer records find more of what adds up: 600 samples of random models come to a 44th of a dashpot's bound
-forwards, and 1e5 of one of them, shaken, to a quarter."""
+"""[s, samples] Sample time and length of a record. The time constants below are chosen in samples, so the sample time
+only sets their unit. Longer records find more of errors that add up: random models reach 1/44 of a dashpot's forward
+bound in 600 samples, and one of them, shaken, reaches a quarter in 1e5."""
 
 RELAXING = "name: rate_dependence, shape: relaxation, time_constant"
 CENTRE = "name: noncongruent, shape: centre, centre: 1, width: 2, amplitude"
@@ -65,7 +65,7 @@ def _log(rng: Generator, low: float, high: float) -> str:
 
 
 def drawn(name: str, seed: int) -> Model:
-    """A model of plays drawn at random, every other one behind a memoryless part, with an effect."""
+    """A random model of plays with an effect, about half of them behind a memoryless part."""
     rng = np.random.default_rng([seed, sum(map(ord, name))])
     n = int(rng.integers(3, 9))
     thresholds = np.append(0.0, np.cumsum(rng.uniform(0.1, 0.6, n))).round(3).tolist()
@@ -81,7 +81,7 @@ def drawn(name: str, seed: int) -> Model:
 
 
 def part(rng: Generator, step: float, low: float, high: float, begin: float) -> list[float]:
-    """Some samples of a drive that moves by no more than `step` in a sample."""
+    """A stretch of a drive from `begin` on that moves by at most `step` per sample."""
     n, rate = int(rng.integers(2, 100)), step * float(rng.choice([1.0, rng.random()]))
     k = np.arange(n)
     moves = (
@@ -99,7 +99,7 @@ def part(rng: Generator, step: float, low: float, high: float, begin: float) -> 
 
 
 def grown(rng: Generator, step: float, low: float, high: float, begin: Sequence[float]) -> Array:
-    """A drive with this beginning."""
+    """A random drive of LENGTH samples that starts with `begin`."""
     v = list(begin) or [float(rng.uniform(low, high))]
     while len(v) < LENGTH:
         v += part(rng, step, low, high, v[-1])
@@ -125,11 +125,11 @@ class Measured:
         self.double = tables.build(model.chain, "float64", T)
 
     def given(self, x: Array, unit: float) -> Array:
-        """Numbers of the arithmetic, nearest to x."""
+        """The numbers of the arithmetic nearest to x."""
         return np.rint(x / unit) if self.compiled.codes else np.float32(x).astype(float)
 
     def _extra(self, one: Compiled) -> dict[str, Array]:
-        """A temperature in half degrees, which every arithmetic has."""
+        """A temperature in half degrees, exact in every arithmetic."""
         if "set_temperature" not in one.tables.calls:
             return {}
         return {"temperature": 20.0 + 0.5 * np.round(4.0 * np.sin(30.0 * self.t))}
@@ -146,7 +146,7 @@ class Measured:
         return float(np.max(np.abs(found - exact)))
 
     def inverse(self, v: Array) -> float:
-        """Error of the inverse, drive units, asked for where the model is with this drive."""
+        """Error of the inverse in drive units, for the model's output with this drive as the reference."""
         extra = self._extra(self.compiled)
         moves = self.compiled.tables.moving.moves != PLAIN
         low, high = output_range(self.compiled.static, self.compiled.parts, T)
@@ -164,7 +164,7 @@ class Measured:
             wanted, _ = reference.answers(self.double.tables, True, op, np.column_stack([reached, sent]).ravel())
             exact = np.clip(wanted[::2], *ends)
         elif moves:
-            exact = v  # where the model was; that the reference is rounded counts too, which is little in comparison
+            exact = v  # the model's own drive; rounding of the reference adds little to the error
         else:
             exact = Compensator(self.model.chain).drives(Run(self.t, reached, extra), ends)  # type: ignore[arg-type]
         return float(np.max(np.abs(sent - exact)))
@@ -184,7 +184,7 @@ def searched(one: Measured, error: Callable[[Array], float], rng: Generator, tri
 
 
 def main() -> None:
-    """Prints a table."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", default="0:3", help="first and last of the models of each effect, as 0:3")
     parser.add_argument("--arithmetic", default="float32,q15")

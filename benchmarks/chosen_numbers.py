@@ -1,4 +1,4 @@
-"""Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
+"""Runs behind chosen numbers that no test of a model can set: what another value would cost or spoil.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
         [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples]
@@ -8,8 +8,8 @@ lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.gains.MOST_CHANGE`; d
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
 `compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`; noisy: `model.MOST_GAIN` and
-`emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`. All of them take
-some seconds, shifts a minute; what is random has fixed seeds.
+`emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`. Each takes some
+seconds, shifts a minute; random numbers have fixed seeds.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def lag() -> None:
 
 
 def newton() -> None:
-    """Steps of Newton's from the reciprocal of the gain before to that of the gain after."""
+    """Newton steps from the reciprocal of the old gain to that of the new one."""
     print("newton: change of the gain in one step, iterations to 2^-24 and to 2^-53")
     for change in (0.1, 0.25, 0.5, 0.75, 0.9):
         iterations = [
@@ -109,7 +109,7 @@ def decades() -> None:
 
 
 def sweeps() -> None:
-    """What an effect is worth over a number of sweeps, as a share of what it is worth over 64 of them."""
+    """Rms contribution of an effect to the output over a number of sweeps, as a share of that over 64 sweeps."""
     counts = (1, 2, 4, 8, 16, 32)
     print("sweeps: effect, worth over", *counts, "sweeps / over 64")
     for effect in EFFECTS:
@@ -122,7 +122,7 @@ def sweeps() -> None:
 
 
 def unknown() -> None:
-    """The rms error of a fit over parts of a record, as a share of that over all of it."""
+    """The rms error of a fit over parts of a record, as a share of that over the whole record."""
     shares = (0.5, 0.2, 0.1, 0.05, 0.02)
     print("unknown: record, length of a part of it, least and largest rms over such a part / over all")
     fit = hystgen.identify(EXAMPLES / "stage_recording.csv")
@@ -139,7 +139,8 @@ def unknown() -> None:
 
 
 def exact() -> None:
-    """Changes of the output at samples that hold a value or lie on a line between two, as shares of its range."""
+    """Largest change of held samples and largest bend of interpolated ones after rounding to digits, as shares of the
+    output's range."""
     print("exact: written with digits, offset / range, largest change where nothing was measured: held, interpolated")
     t = np.arange(4001)
     slow = np.arange(0, 4001, 8)
@@ -157,7 +158,8 @@ def exact() -> None:
 
 
 def lengths() -> None:
-    """What the error of a play sum on rate-independent plants goes with, and that of a stage that creeps."""
+    """Shares of a play sum's error explained without and with rates, on three rate-independent plants and one with
+    creep."""
     print("lengths: plant, error explained without rates / with them, by averages over 0, 2, 3, 4, 6 and 11 distances")
     t = 1e-3 * np.arange(12000)
     v = 4.0 * np.exp(-0.15 * t) * np.sin(2.0 * np.pi * (0.7 * t + 0.05 * t**2))
@@ -182,7 +184,7 @@ def lengths() -> None:
 
 
 def visits() -> None:
-    """How much the answer after a history changes with the samples of its moves."""
+    """How much the output after a history depends on the number of samples in each of its moves."""
     samples = (25, 100, chain.VISIT_SAMPLES, 800)
     print(f"visits: effect, largest change, share of the answer's range: {samples} samples a move against 3200")
     v = np.concatenate([np.linspace(1.0, 3.0, 500), np.linspace(3.0, -2.0, 800)])
@@ -204,9 +206,9 @@ def visits() -> None:
 
 
 def quiet() -> None:
-    """What a quiet drive misses of slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
+    """Error of a quiet drive on slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
 
-    Rms of what arrives less the rounded reference, output codes, from the end of the first second on.
+    The error is the rms difference between output and rounded reference after the first second, in output codes.
     """
     counts = (2, 8, layout.QUIET, 128)
     print(f"quiet: samples a code of the ramp; error led always, and quiet from {counts} equal references on; changes")
@@ -227,10 +229,10 @@ def quiet() -> None:
 
 
 def averages() -> None:
-    """What averages lose of smooth references, and poles in front of the lead that hold the same noise gain.
+    """Error of averages on smooth references, and of poles in front of the lead that keep the same noise gain.
 
-    References of 60 to 480 samples a period with the same size each; rms error, % of the reference. With a preview
-    poles come as many samples earlier as suits them best; without one averages look back.
+    References are sines of equal size with 60 to 480 samples a period; errors are rms, in % of the reference. With a
+    preview, the poles are advanced by the number of samples that suits them best; without one, averages look back.
     """
     at = 2.0 * np.pi / np.geomspace(60.0, 480.0, 40)
     leads = {
@@ -266,9 +268,9 @@ def averages() -> None:
 
 
 def shifts() -> None:
-    """How near to `found_shifted` a search comes: steps in which plays follow, more or less, drawn and changed.
+    """How close a search over random sequences of steps, in which plays follow partly, comes to `found_shifted`.
 
-    For given steps the largest error is a sum over all shifts, `sum |c_ik|`, whose factors are followed backwards.
+    For given steps the largest error is `sum |c_ik|` over all shifts; the factors are computed backwards from the end.
     """
     print("shifts: largest error that a search finds, share of the bound; plays in order of thresholds, or in any")
     rng = np.random.default_rng(9)
@@ -295,13 +297,14 @@ def shifts() -> None:
 
 
 def _followed(rng: np.random.Generator, n: int, in_order: bool) -> NDArray[np.float64]:
-    """Shares (n,) of their way that plays go in a step; in order, none more than one with a smaller threshold."""
+    """Share (n,) of its way that each play goes in a step; `in_order`: at most that of plays with smaller
+    thresholds."""
     shares = np.where(rng.random(n) < rng.uniform(0.2, 0.9), rng.choice([1.0, 0.3, 0.1, 0.01], n), 0.0)
     return np.sort(shares)[::-1] if in_order else shares
 
 
 def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> float:
-    """Largest `e` with `p_0 e + sum p_i d_i = 0` behind the steps, over all shifts of the input up to 1 in each."""
+    """Largest `e` with `p_0 e + sum p_i d_i = 0` after the steps, over all shifts of the input by up to 1 in each."""
     factor, total = -p[1:] / p[0], 0.0
     for shares in reversed(steps):
         kept = factor - p[1:] * float(shares @ factor) / float(p[0] + p[1:] @ shares)
@@ -311,8 +314,9 @@ def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> fl
 
 
 def branches() -> None:
-    """A lag in front of two branches 0.01 V apart, by how many times the move before is led at most: the error on sines
-    of 100 and 400 samples from rest, and how far a step of 0.2 um out of a slow ramp goes beyond its end."""
+    """A lag in front of two branches 0.01 V apart, for several limits of the led move as a multiple of the previous
+    move: the error on sines of 100 and 400 samples from rest, and the overshoot of a step of 0.2 um out of a slow
+    ramp."""
     print("branches: times the move before, rms and largest error on sines of 100 and 400 samples, um, overshoot, um")
     curve = "a0: 6, a1: 0.4, a2: 0.1, a3:"
     front = f"  memoryless: {{kind: tanh, ascending: {{{curve} 0.2}}, descending: {{{curve} 0.21}}}}\n  effects:"
@@ -332,8 +336,8 @@ def branches() -> None:
 
 
 def noisy() -> None:
-    """Lags by their noise gain, and the drive's noise for white noise of the reference of 1e-4 of its range, rms, on a
-    slow ramp, where all plays follow, and behind a turn of it, where none does."""
+    """Noise gain of lags, and noise of the drive for a reference with white noise of rms 1e-4 of its range: on a slow
+    ramp, where all plays follow, and after its turn, where none does."""
     print("noisy: lag / step, noise gain, rms noise of the drive / its range on the ramp, behind its turn")
     rng = np.random.default_rng(1)
     for samples in (0.5, 1.0, 1.2, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 250.0):
@@ -352,8 +356,8 @@ def noisy() -> None:
 
 
 def fast() -> None:
-    """Effects over within a sample: how far they move the output at the fastest rate with a stated bound, % of its
-    range."""
+    """Effects that settle within a sample: how far they move the output at the fastest rate with a stated bound, in %
+    of its range."""
     shapes = ("lag, time_constant", "delay, time", "rate_dependence, shape: relaxation, time_constant")
     print("fast: step / time constant; lag, delay, relaxing plays")
     place = np.arange(8 * SAMPLES_A_SWEEP + 1) / SAMPLES_A_SWEEP
@@ -369,7 +373,7 @@ def fast() -> None:
 
 
 def samples() -> None:
-    """The largest error found with more and more samples, as a multiple of that with the most."""
+    """The largest error found over a growing number of samples, as a multiple of that over the largest number."""
     counts = (200, 400, 800, 3000)
     print("samples:", *(f"{n:6}" for n in counts))
     for effect in ("lag, time_constant: 1.0e-3", "lag, time_constant: 1.0e-2",
@@ -384,7 +388,7 @@ def samples() -> None:
 
 
 def _lost(response: NDArray[np.complex128]) -> float:
-    """Rms of what a response changes, %."""
+    """Rms deviation of a frequency response from 1, in %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
 
 

@@ -1,14 +1,14 @@
-"""Measure what each effect adds to an emitted model: bytes of code, and instructions of a sample.
+"""Measure what each effect adds to an emitted model: bytes of code, and instructions per sample.
 
     python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
 
-Code is that of a module at -O2, of zig and gcc the larger one (RISC-V: zig); instructions are the mean of the inverse,
-or of the forward operator for what that alone has, strict -O2 build of zig, over a slow sine. `any` is what any effect
-at all adds, a gain among it, which is the least of them (`any_corners`: with engine corners, code alone); the others
-are more than that, or less. Plays that a search
-finds have that in common, `dilated`, and more than that; `braked` is what a lag and a slew limit take together beyond
-what each of them does, `quiet` what it takes beyond a lag. `effect_sizes.csv`, which the banner of emitted files is
-made from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
+Code is that of a module at -O2, the larger of zig and gcc (RISC-V: zig only); instructions are the mean over a slow
+sine in a strict -O2 build of zig, of the inverse, or of the forward operator for parts that only it has. `any` is what
+any effect adds, measured with a gain, the cheapest one (`any_corners`: code with engine corners); the other rows have
+the difference from that, which may be negative. Plays that a search finds have `dilated` in common, and their rows have
+what they take beyond it; `braked` is what a lag and a slew limit together take beyond their sum, `quiet` what it takes
+beyond a lag. `effect_sizes.csv`, the source of figures in the banner of emitted files, has the code on the two cores of
+`hystgen.compensator.engines`; `docs/effects.csv` has all cores.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
 INSIDE = {"quiet": "lag", "friction": "heat"}
-"""Parts of the code that only stand beside another one."""
+"""Parts of the code that only occur together with another part."""
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
@@ -64,13 +64,13 @@ EFFECTS = {
 }
 """A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
 OTHERS = {"dilated": "0", "polynomial": "[0.02]"}
-"""What stands for each play but the first."""
+"""The value for each play but the first."""
 assert {"any", *EFFECTS} == set(PARTS)
 
 
 @functools.cache
 def model(effect: str, plays: int = CODE_PLAYS) -> Model:
-    """So many plays with one effect, or none."""
+    """A model of `plays` plays with one effect, or with none."""
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
     text += f"    thresholds: {[0.45 * k for k in range(plays + 1)]}\n    weights: {[0.7] + [0.05] * plays}\n"
     if effect:
@@ -87,7 +87,7 @@ Measures = tuple[dict[str, int], dict[str, float]]
 def measured(
     folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse", engine: str = "loop"
 ) -> Measures:
-    """Bytes of code and mean instructions of a sample of an operator on each core."""
+    """Bytes of code and mean instructions per sample of an operator on each core."""
     one = model(effect)
     options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
@@ -110,7 +110,7 @@ def measured(
 
 
 def together(apart: list[Measures], least: Measures) -> Measures:
-    """What a model of several effects would take if each added as much as it does by itself."""
+    """The cost of a model of several effects if each added as much as it does by itself."""
 
     def added(of: Sequence[dict[str, Any]], base: dict[str, Any]) -> dict[str, Any]:
         return {core: sum(each[core] for each in of) - (len(of) - 1) * base[core] for core in base}

@@ -3,8 +3,8 @@
     python benchmarks/effects.py [--check]
 
 The drive sweeps its whole range at 5 Hz, sampled at 10 kHz, so that half of the plays are always moving. Medians of
-nine runs after compilation. With `--check` the exit code is 1 where one takes 50 ms or more, or 150 ms where plays
-relax with an exponent, which takes steps of controlled error.
+nine runs after compilation. With `--check` the exit code is 1 if an effect takes 50 ms or more; the limit is 150 ms for
+plays that relax with an exponent, which are integrated with error control.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ CASES: tuple[dict[str, Any], ...] = (
 
 
 def effect(case: dict[str, Any]) -> Effect:
-    """The effect of a case, of the shape that it names or the first."""
+    """The effect of a case, in the shape it names or else the first one."""
     shapes = effects.shapes(case["name"])
     word = case.get(shapes[0].selector)
     chosen = next((s for s in shapes if word and word in s.model_fields[s.selector].annotation.__args__), shapes[0])

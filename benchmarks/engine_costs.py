@@ -1,12 +1,12 @@
-"""Measure what `engine: auto` chooses from: instructions of a sample with each engine, for few plays, and code.
+"""Measure the costs by which `engine: auto` chooses: instructions per sample of each engine for few plays, and code.
 
     python benchmarks/engine_costs.py [-o hystgen]
 
-Instructions are the mean over a decaying multisine, strict -O2 build of zig, for both operators, every arithmetic, with
-and without a memoryless part (a dead zone), and the same with the effect that takes least, a gain, for few numbers of
-plays. Code is that of a module at -O2, of zig and gcc the larger one, for every kind that
-`hystgen.compensator.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The shipped
-tables are read by `hystgen.compensator.engines`, so that the same parameters give the same C everywhere.
+Instructions are the mean over a decaying multisine in a strict -O2 build of zig, for both operators and every
+arithmetic, with and without a memoryless part (a dead zone); models with a gain, the cheapest effect, are measured at
+fewer numbers of plays. Code is that of a module at -O2, the larger of zig and gcc, for every kind that
+`hystgen.compensator.engines.kind` distinguishes. Both are measured on a Cortex-M0+ without and a Cortex-M4F with an
+FPU. `hystgen.compensator.engines` reads the shipped tables, so the same parameters give the same C everywhere.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
-CODE_PLAYS = 10  # plays where code is measured; with 64 at most 16 bytes more or less: gcc, float32 and q31, both cores
+CODE_PLAYS = 10  # plays at which code is measured; 64 change it by at most 16 bytes (gcc, float32 and q31, both cores)
 KINDS = ("pi", "gpi", "effects", "gpi_effects")
 GAIN = "  effects: [{name: thermal, gain_per_degree: 0.001}]\nsample_time: 1.0e-3\n"
 EFFECT_PLAYS = (1, 4, 16)
-"""Plays of models with effects; the row at or below a model's number counts. Three do: from 1 to 16 corners grow by 3 %
-and loop by 1240 to 1364 instructions a play (float32, inverse, M0+; rows `effects` that this program writes)."""
+"""Plays of models with effects; a model takes the nearest row at or below its number. Three rows suffice: from 1 to 16
+plays, corners grows by 3 %, and loop by 1240 to 1364 instructions a play (float32, inverse, M0+; rows `effects`)."""
 DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
 TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"
 BRANCHES = TANH[:-1] + ", descending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.5}}"
@@ -56,7 +56,7 @@ SHIPPED = Path(__file__).resolve().parents[1] / "hystgen" / "compensator"
 
 @functools.cache
 def model(n: int, front: str, effects: str = "") -> Model:
-    """The benchmark's model, as it is or behind stages, and with effects."""
+    """The benchmark's model, alone or behind memoryless stages, with or without effects."""
     p = bench.model(n).parameters.model.pi
     text = (
         f"hystgen: 1\nname: bench\ninput_range: [-{bench.RANGE}, {bench.RANGE}]\nmodel:\n  pi:\n"
@@ -95,7 +95,7 @@ def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> 
 
 
 def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:
-    """Bytes of code of a module on each core, constant tables left out; of both compilers the larger one."""
+    """Bytes of code of a module on each core without constant tables, the larger of both compilers."""
     one = model(CODE_PLAYS, FRONTS[kind])
     assert engines.kind(one.cascade, arithmetic) == kind
     options = emit_options(one, operator, arithmetic, engine)

@@ -5,7 +5,7 @@
 1. Simulating 10^6 samples through 64 plays, against the textbook sample loop in numpy (each play a row of an array).
 2. `hystgen emit` of a small parameter file, from start to end, against `python -c "import numpy, jinja2"`.
 
-With `--check` the exit code is 1 where a ratio misses its target.
+With `--check` the exit code is 1 if a ratio misses its target.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def simulation(name: str, v: NDArray[np.float64]) -> float:
     r = np.linspace(0.0, 5.0, PLAYS + 1)
     p = np.concatenate([[1.0], np.full(PLAYS, 0.05)])
     model = PI(r.tolist(), p.tolist())
-    model.simulate(v[:1000])  # compiles, where that has not been done before
+    model.simulate(v[:1000])  # compiles, unless that is cached
     y = textbook(v, r, p)
     gap = float(np.max(np.abs(y - model.simulate(v))))
     assert gap < 1e-10, gap
@@ -90,7 +90,7 @@ def start_up() -> float:
 
 
 def main() -> int:
-    """Print the table; with --check say by the exit code whether the targets are met."""
+    """Print the table; with --check, the exit code says whether the targets are met."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="exit 1 where a target is missed")
     wanted = parser.parse_args().check

@@ -1,11 +1,11 @@
-"""How fast and how small a fit is, beside non-negative least squares on the whole regressor matrix.
+"""Time and memory of a fit, compared with non-negative least squares on the whole regressor matrix.
 
     python benchmarks/identification.py [--check] [--large]
 
-200 000 samples and 64 thresholds: seconds of both in the same run on one thread, the regressor matrix of the other
-counted in since it has to be made for it, and the residuals of both. `--large` fits a record of 10^7 samples as well
-and says how much memory that took beyond the record. `--check`: exit 1 unless the ratio is at least 10, the residuals
-agree to 1e-6 of themselves, and, with `--large`, memory does not grow with the number of thresholds.
+For 200 000 samples and 64 thresholds it prints the seconds of both in the same run on one thread, including those to
+build the regressor matrix, and by how much their residuals differ. `--large` also fits a record of 10^7 samples and
+prints the memory used beyond the record. `--check`: exit 1 unless the ratio is at least 10, the residuals agree to a
+relative 1e-6 and, with `--large`, memory does not grow with the number of thresholds.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def best(run: Callable[[], object]) -> float:
 
 
 def compare(v: Array) -> tuple[float, float, float]:
-    """Seconds of the other and of ours, and by how much the residuals differ, as a share."""
+    """Seconds of nnls and of hystgen, and the relative difference of their residuals."""
     from scipy.optimize import nnls
 
     r = np.linspace(0.0, 45.0, PLAYS + 1)
@@ -80,7 +80,7 @@ def compare(v: Array) -> tuple[float, float, float]:
 
 
 def fit(samples: int, plays: int | None) -> tuple[float, float]:
-    """Seconds of a fit, and bytes of memory at its peak beyond the record; in a process of its own."""
+    """Seconds of a fit, and its peak memory beyond the record in bytes; to be called in a process of its own."""
     v = drives(samples)["noisy ramps"]
     y = operators.plays(v, [0.0, 5.0, 20.0], 0.0).T @ [0.5, 0.2, 0.1]
     record = Record("made", np.arange(samples) * 1e-5, v, y, sample_time=1e-5)

@@ -53,7 +53,7 @@ def columns(samples: int) -> dict[str, np.ndarray]:
 
 
 def write_files(samples: int, folder: Path) -> Iterator[Path]:
-    """The same record in one file a format, each written when the one before has been used."""
+    """The same record as one file per format, each written after the previous one has been used."""
     import h5py
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -100,7 +100,7 @@ def measure(path: Path) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print a line a format."""
+    """Print a line for each format."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--samples", type=int, default=10_000_000)
     samples = parser.parse_args().samples

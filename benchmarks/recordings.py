@@ -2,11 +2,12 @@
 
     python benchmarks/recordings.py FOLDER [--only NAME ...] [-o docs/recordings.csv]
 
-`FOLDER` has the recordings of `SETS`, columns t, v, y, which are of others and not part of this project. Errors are rms
-with a free offset, in % of the range of the held-out output, over the samples that both `identify` and `diagnose`
-compare. Baselines, by least squares: a straight line; 16 plays with weights of either sign; 16 x 16 relays of
-Preisach's; a cubic beside the plays; `LAGS` past samples of the drive beside the plays. `diagnosed`: behind `diagnose`,
-which begins with the model of `auto`; `s`: its time. `best`: the best baseline over `diagnosed`.
+`FOLDER` holds the recordings named in `SETS` (columns t, v, y), which belong to others and are not part of this
+project. Errors are rms with a free offset, in % of the range of the held-out output, over the samples that both
+`identify` and `diagnose` compare. The baselines are fitted by least squares: a straight line; 16 plays with weights of
+either sign; Preisach relays on 16 x 16 levels; a cubic beside the plays; `LAGS` past samples of the drive beside the
+plays. `diagnosed`: error after `diagnose`, which starts from the model of `auto`; `s`: its time. `best`: error of the
+best baseline over `diagnosed`.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from hystgen.records import Record, read_record
 Array = NDArray[np.float64]
 
 PLAYS, LEVELS, LAGS = 16, 16, 32
-"""Sizes of the baselines, not chosen by any error: as many plays as levels of the plane of relays; samples of the drive
-before the present one, 0.16 s of the records of the P-885."""
+"""Sizes of the baselines, not tuned to any error: as many plays as levels of the relays, and enough past samples of the
+drive to cover 0.16 s of the P-885 records."""
 
 REPORTED = {
     "loops run clockwise": "clockwise",
@@ -43,14 +44,14 @@ REPORTED = {
     "too little to judge": "start unknown",
     "can be compared": "too short",
 }
-"""What the program says of recordings, in short."""
+"""Parts of the program's messages about recordings, and short words for them."""
 
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh", "auto")
 
 
 @dataclass(frozen=True)
 class Part:
-    """A share of a recording, from and to shares of its samples."""
+    """A part of a recording, from `first` to `last` as shares of its samples."""
 
     file: str
     first: float = 0.0
@@ -59,7 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Set:
-    """Recordings to fit and to hold out; `skip`: seconds at the start of each; `exchanged`: v and y change places."""
+    """Recordings to fit and to hold out; `skip`: seconds left out at each start; `exchanged`: v and y are swapped."""
 
     fit: tuple[Part, ...]
     held: tuple[Part, ...]
@@ -129,7 +130,7 @@ def plays(v: Array, drives: Array) -> Array:
 
 
 def relays(v: Array, drives: Array) -> Array:
-    """Preisach's relays that switch at two of `LEVELS` levels, and the drive."""
+    """Preisach relays that switch at two of `LEVELS` levels, and the drive."""
     levels = np.linspace(np.min(drives), np.max(drives), LEVELS)
     up, down = (levels[k] for k in np.triu_indices(LEVELS)[::-1])
     state = np.where(v[0] >= up, 1.0, -1.0)
@@ -218,7 +219,7 @@ def row(name: str, folder: Path) -> dict[str, str]:
     try:
         diagnosis = hystgen.diagnose(fits["auto"].model, to_fit, holdout=to_hold, skip=of.skip)
         found["s"] = f"{time.perf_counter() - began:.1f}"
-        signals = [each for each in diagnosis.signals if each.held_out][: len(to_hold)]  # ends of fitted ones follow
+        signals = [each for each in diagnosis.signals if each.held_out][: len(to_hold)]  # ends of fitted records follow
     except IdentificationError as failure:
         found["says"] = str(failure)
     held_out = []
@@ -240,7 +241,7 @@ def row(name: str, folder: Path) -> dict[str, str]:
 
 
 def reported(says: str) -> str:
-    """What is said of recordings, in short."""
+    """The messages about a recording in short words."""
     return ", ".join(short for text, short in REPORTED.items() if text in says)
 
 

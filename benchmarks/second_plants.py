@@ -1,9 +1,10 @@
 """A second simulator of plants for `hystgen diagnose`, which shares nothing with the first (`benchmarks/plants`).
 
-Short records (450 to 900 samples) as a laboratory takes them, hysteresis by an Everett function with a stack of
-extremes and a friction element by its differential equation, effects by their own equations, and disturbances that are
-no effect: another axis that steps at random, room temperature on the gain, weights that change with time, a slow line
-of crosstalk, a guide that sticks. Cases and labels have the layout of `benchmarks.plants`, which runs and scores them:
+The records are short (450 to 900 samples), as a laboratory takes them. Hysteresis comes from an Everett function with a
+stack of extremes and from a friction element's differential equation; each effect has an equation of its own.
+Disturbances outside the catalogue are another axis that steps at random, room temperature acting on the gain, weights
+that change with time, slow sinusoidal crosstalk, and a guide that sticks. Cases and labels have the layout of
+`benchmarks.plants`, which runs and scores them:
 
     python -m benchmarks.second_plants --kind single --seeds 0:30 -o build/second
     python -m benchmarks.plants run build/second/cases -o build/second/results
@@ -34,7 +35,7 @@ NOISE = 4e-4
 TAU = 2.0 * np.pi
 
 LATE, RESOLVED = 30.0, 1.5
-"""Samples by which the strongest lag or delay is late, and below which its tail cannot be seen."""
+"""[samples] Lateness of the strongest lag or delay, and lateness below which lag and delay look the same."""
 
 
 # A session: records with gaps between them, on one fine time axis ---------------------------------------------
@@ -42,7 +43,7 @@ LATE, RESOLVED = 30.0, 1.5
 
 @dataclass(frozen=True)
 class Session:
-    """Fine time [s], drive and temperature [K over the start]; the fine samples, names and use of the records."""
+    """Fine time [s] and drive; for each record its fine samples, its name, and whether it is held out."""
 
     t: Array
     v: Array
@@ -51,7 +52,7 @@ class Session:
     held: tuple[bool, ...]
     samples: int
     step: float
-    """s between two samples"""
+    """[s] sample time"""
 
 
 def _triangle(t: Array, periods: float) -> Array:
@@ -59,7 +60,7 @@ def _triangle(t: Array, periods: float) -> Array:
 
 
 def drives(rng: np.random.Generator) -> list[tuple[str, bool, Callable[[Array], Array]]]:
-    """Name, held out or not, and drive between 0 and 1 over the record's share of time."""
+    """Name, held out or not, and drive between 0 and 1 as a function of the share of the record's time."""
     levels = rng.uniform(0.0, 1.0, 6)
     more = rng.uniform(0.0, 1.0, 5)
     phases = rng.uniform(0.0, TAU, 5)
@@ -106,7 +107,7 @@ def drives(rng: np.random.Generator) -> list[tuple[str, bool, Callable[[Array], 
 
 
 def session(rng: np.random.Generator, slow: bool) -> Session:
-    """The records of a stage that is examined fast (milliseconds) or slowly (tenths of seconds)."""
+    """A session with a sample every 0.1 s (`slow`) or every millisecond."""
     samples = int(rng.choice([450, 600, 900]))
     step = 0.1 if slow else 1e-3
     fine = step / FINER
@@ -137,22 +138,23 @@ def sampled(fine: Array, part: slice) -> Array:
 
 @dataclass(frozen=True)
 class Stage:
-    """Everett function `d (first + second d + third d^2)` of a move by d, all over the range; friction beside it."""
+    """The Everett function of a move by d is `d (slope + second d + third d^2)` all over the range; friction is
+    added."""
 
     slope: float
     second: float
     third: float
     friction: float
     centre: float = 0.0
-    """How much larger a move is per range from the middle: not congruent."""
+    """Relative growth of a move per range of its distance above the middle, which makes loops not congruent."""
 
     def moved(self, v: Array) -> tuple[Array, Array]:
-        """What follows the drive at once, and the rest, over a drive in ranges from 0."""
+        """The reversible part of the output, and the rest, for a drive in ranges that starts from 0."""
         return self.slope * v, self._everett(v) + self._friction(v)
 
     def _everett(self, v: Array) -> Array:
         out = np.empty(len(v))
-        stack: list[tuple[float, float]] = [(0.0, 0.0)]  # place and output of the reversals that are remembered
+        stack: list[tuple[float, float]] = [(0.0, 0.0)]  # drive and output at the remembered reversals
         up, last = True, float(v[0])
         level = self._move(0.0, last)
         out[0] = level
@@ -191,7 +193,8 @@ class Stage:
 
 @dataclass
 class Plant:
-    """What the effects of a plant change; each is called with signals over the fine samples of the session."""
+    """Changes by effects to the drive, the irreversible part and the output, each called with signals on the fine
+    grid."""
 
     drive: list[Callable[[Session, Array], Array]]
     rest: list[Callable[[Session, Array], Array]]
@@ -199,7 +202,7 @@ class Plant:
     centre: float = 0.0
 
     def run(self, made: Session, stage: Stage) -> Array:
-        """Output over all fine samples, in ranges."""
+        """Output at all fine samples, for a drive in ranges."""
         v = (made.v - LOW) / (HIGH - LOW)
         for change in self.drive:
             v = change(made, v)
@@ -214,7 +217,7 @@ class Plant:
 
 
 def filtered(t: Array, x: Array, time: float) -> Array:
-    """A first-order lag over uneven times, whose input steps halfway between two of them."""
+    """A first-order lag on uneven times; the input steps halfway between two of them."""
     out = np.empty(len(x))
     state, last, kept = float(x[0]), float(x[0]), np.exp(-0.5 * np.diff(t, prepend=t[0]) / time).tolist()
     for k, (value, keep) in enumerate(zip(x.tolist(), kept, strict=True)):
@@ -225,7 +228,7 @@ def filtered(t: Array, x: Array, time: float) -> Array:
 
 
 def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
-    """A mode driven by x, which steps halfway between two times, by exact steps of its rotation."""
+    """A vibration mode driven by x, which steps halfway between two times; its rotation is exact."""
     out = np.empty(len(x))
     w, dt = TAU * frequency, np.diff(t, prepend=t[0])
     damped = w * np.sqrt(1.0 - damping**2)
@@ -247,7 +250,7 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
 
 
 Effect = Callable[[np.random.Generator, Session, float, Plant], None]
-"""Adds itself to a plant with a strength of about 0.01 to 1."""
+"""Adds an effect to a plant, with a strength of about 0.01 to 1."""
 
 
 def creep(rng: np.random.Generator, made: Session, x: float, plant: Plant) -> None:
@@ -345,7 +348,7 @@ EFFECTS: dict[str, tuple[Effect, bool]] = {
     "saturation": (saturation, False), "thermal": (thermal, True), "drift": (drift, True), "ageing": (ageing, True),
     "sensor_nonlinearity": (sensor_nonlinearity, False), "noncongruent": (noncongruent, False),
 }  # fmt: skip
-"""Each effect, and whether it is examined slowly."""
+"""Each effect, and whether it needs a slow session."""
 
 
 # Disturbances: no effects of the actuator -------------------------------------------------------------------
@@ -389,7 +392,7 @@ FOREIGN = {each.__name__: each for each in (other_axis, room, changing_weights, 
 
 
 def beside_steps(x: Array) -> NDArray[np.bool_]:
-    """The samples within two of a step of the drive (in ranges) that takes two samples at most."""
+    """The samples within two of a fast step of the drive x (in ranges), one that takes at most two samples."""
     near = np.zeros(len(x), dtype=bool)
     for k in range(1, len(x) - 3):
         size = abs(x[k + 2] - x[k])
@@ -399,9 +402,10 @@ def beside_steps(x: Array) -> NDArray[np.bool_]:
 
 
 def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = False) -> float:
-    """rms that plays with weights of any sign and an offset per record leave: a plain linear fit behind the first move.
+    """rms residual of a linear least-squares fit of plays with weights of any sign and an offset per record.
 
-    Of all records together; plays over thresholds up to half the range. `without_steps`: not of samples `beside_steps`.
+    All records together, each from its later extreme on; thresholds up to half the range. `without_steps`: without the
+    samples `beside_steps`.
     """
     tables, targets = [], []
     for one, drive in zip(y, v, strict=True):
@@ -414,7 +418,7 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = Fal
                 out[k] = play
             rows.append(out)
         behind = max(int(np.argmax(x)), int(np.argmin(x)))
-        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # its memory is never known
+        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # its start memory is not wiped out in time
             continue
         used = behind + np.flatnonzero(~(without_steps & beside_steps(x)[behind:]))
         part = np.stack(rows)[:, used]
@@ -426,7 +430,7 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = Fal
 
 
 def alike(name: str, x: float) -> list[str]:
-    """Effects that no record of these can tell from one of this strength: what is over within a sample or so."""
+    """Effects that these records cannot tell from effect `name` of strength x: a lag and a delay of a sample or so."""
     late = ("lag", "delay")
     return [other for other in late if other != name] if name in late and x * LATE < RESOLVED else []
 
@@ -476,7 +480,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
     ratios: list[float] = []
     for name in chosen:
         ratio = float(np.exp(rng.uniform(np.log(5.0), np.log(20.0))))
-        # a limit that only a step within two samples meets is a delay of that step, and no record shows which
+        # a limit met only by steps within two samples cannot be told from a delay of those steps, so they do not count
         apart = name == "slew_limit"
         strengths[name] = strength(lambda x, name=name: output({name: x}), ratio * noise, apart)  # type: ignore[misc]
         left = unabsorbed(output({name: strengths[name]}), v, apart)

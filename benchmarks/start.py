@@ -1,8 +1,8 @@
-"""Processor time of `hystgen emit` of a plain model, in units of importing numpy and jinja2, which it needs.
+"""Processor time of `hystgen emit` for a plain model, relative to importing numpy and jinja2, which it needs.
 
 `python benchmarks/start.py --runs 30` runs the two in turn, each in a process of its own, and prints the least and the
-median of both and their ratio, and the modules of hystgen that the command imports. Modules have to be compiled: the
-first run is not counted, and PYTHONDONTWRITEBYTECODE is not passed on.
+median of both and their ratio, and the modules of hystgen that the command imports. The first run, which compiles the
+modules, is not counted, and PYTHONDONTWRITEBYTECODE is not passed on.
 """
 
 from __future__ import annotations

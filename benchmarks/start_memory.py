@@ -1,17 +1,17 @@
-"""What an unknown start costs: held-out errors of fits without a history, over those with the true one.
+"""What an unknown start memory costs: held-out errors of fits without a history, over those with the true one.
 
     python benchmarks/start_memory.py [--seeds A:B] [--drives NAME ...] [--check]
 
-Plants with other hysteresis than a play sum (an Everett function with a stack of extremes, and a friction element)
-that come from anywhere in their range; `--seeds` gives another plant each. They are driven further and further both
-ways, from one end, or over random turns, or so that no extreme comes twice. Held-out loops stay within 70 % of the
-fitted range (`inside`) or take all of it (`whole`) and start from a known memory. Their errors are rms with a free
-offset, and ratios those of the errors with the noise of the records added, as a user sees them.
+The plants are no play sums (an Everett function with a stack of extremes, and a friction element) and have been
+anywhere in their range before a record; each seed gives another plant. Records swing further and further to both sides,
+from one end, or between random turns, or visit no extreme twice. Held-out loops start from a known memory and stay
+within 70 % of the fitted range (`inside`) or cover all of it (`whole`). Errors are rms with a free offset; before a
+ratio is taken, the noise of the records is added to them, as a user sees them.
 
-`bound`: the same ratio of what the records themselves leave open, whatever the estimator: the spread of the held-out
-output under the posterior of a linear model about the truth, whose weights, and in the case without a history the start
-memory, are unknown. `residual`: of the fit without a history, over that with it; above one the search has missed a
-better memory. `--check`: exit 1 unless the median ratio of each drive is at most 1.1 within and over the whole range.
+`bound`: the same ratio for the uncertainty that the records leave to any estimator: the posterior spread of the
+held-out output in a model linear about the truth, with unknown weights and, without a history, an unknown start memory.
+`residual`: residual of the fit without a history over that of the fit with it; above 1, the search missed a better
+memory. `--check`: exit 1 unless the median ratio of each drive is at most 1.1 both `inside` and `whole`.
 """
 
 from __future__ import annotations
@@ -34,39 +34,40 @@ from hystgen.records import Record
 Array = NDArray[np.float64]
 
 HIGH = 100.0
-"""[V] The plants are driven between 0 and this. Output units are per cent of their motion, so that the mean weight is
-1, which the prior of `bound` counts in."""
+"""[V] Upper end of the drive range, which starts at 0. Outputs are in per cent of the plants' motion, so the mean
+weight, the unit of the prior of `bound`, is 1."""
 
 NOISE = 100.0 * NOISE_SHARE
-"""[output units] rms, that of the second plants."""
+"""[output units] rms noise, as in `second_plants`."""
 
 SAMPLES, HELD, LEAD = 600, 800, 400
-"""Samples of a record to fit, a short one; of one held out, some 70 a leg; and of the drive before the former. With 300
-or 1200, 400 and 200 instead, no median ratio of seeds 0:8 changes by more than 0.08, and none exceeds `COST`."""
+"""Samples of a record to fit, which is short; of a held-out record, about 70 a leg; and of the drive before a record.
+With 300 or 1200, 400 and 200 instead, no median ratio of seeds 0:8 changes by more than 0.08, and none exceeds
+`COST`."""
 
 INSIDE = 0.7
-"""[share of the fitted range] of the held-out loops that stay inside: well within the extremes, where an unknown start
-shows most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
+"""[share of the fitted range] Range of the inner held-out loops: well within the extremes, where an unknown start shows
+most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
 
 COST = 1.1
 """[times] The most that an unknown start may cost: a tenth, which a user would hardly notice in a held-out error."""
 
 FINE = 40
-"""Plays of the linear model of the bound, up to half the plants' range."""
+"""Plays of the linear model behind `bound`, with thresholds up to half the plants' range."""
 
 SMOOTH = 1.0
-"""[mean weight density] How far a density may change over the whole reach, one standard deviation, in the bound: as far
-as from nothing to twice itself. With 0.3 and 3 instead, the medians of the bound change by at most 0.15."""
+"""[mean weight density] Standard deviation, in the prior of `bound`, of the change of the density over all thresholds:
+one mean, so from nothing to twice the mean. With 0.3 and 3 instead, the medians of the bound change by at most 0.15."""
 
 FROM_BELOW = (3.0 * HIGH, 0.0)
-"""Drive values that leave plays as the plants begin, at the lowest of their range."""
+"""Drive values after which plays start as the plants do, from the lower end of the range."""
 
 
 # Drives, as turns between 0 and 1 ---------------------------------------------------------------------------
 
 
 def both_ways(rng: np.random.Generator) -> list[float]:
-    """Amplitudes that grow to the end, around the middle of the range or beside it."""
+    """Swings of growing amplitude around the middle of the range or a point near it."""
     cycles, middle = rng.integers(5, 10), rng.uniform(0.4, 0.6)
     turns = [middle]
     for share in np.linspace(0.12, 1.0, cycles):
@@ -76,19 +77,19 @@ def both_ways(rng: np.random.Generator) -> list[float]:
 
 
 def one_way(rng: np.random.Generator) -> list[float]:
-    """From the lower end and back to it, further each time; the record ends at the top."""
+    """Swings from the lower end and back, further each time; the record ends at the top."""
     return [0.0, *(x for top in np.linspace(0.2, 1.0, rng.integers(4, 8)) for x in (top, 0.0))][:-1]
 
 
 def growing_walk(rng: np.random.Generator) -> list[float]:
-    """Turns on either side, not quite as far as each other."""
+    """Turns on alternating sides of the middle, at distances that grow unevenly."""
     number, sign = int(rng.integers(8, 16)), rng.choice([-1.0, 1.0])
     shares = (np.arange(1, number + 1) + rng.uniform(-0.3, 0.3, number)) / (number + 0.3)
     return [0.5, *(0.5 + 0.5 * sign * shares * (-1.0) ** np.arange(number)).tolist()]
 
 
 def never_twice(rng: np.random.Generator) -> list[float]:
-    """Turns at random; both ends of the range come late, and once."""
+    """Random turns; both ends of the range come late and only once."""
     turns = rng.uniform(0.15, 0.85, rng.integers(10, 16)).tolist()
     turns[-3:-1] = (0.0, 1.0) if rng.integers(2) else (1.0, 0.0)
     return list(turns)
@@ -98,7 +99,7 @@ DRIVES: dict[str, Callable[[np.random.Generator], list[float]]] = {
     "both ways": both_ways, "one way": one_way, "walk": growing_walk, "never twice": never_twice,
 }  # fmt: skip
 LOOPS = (-1.0, 1.0, -1.0, 0.3, -0.6, 0.8, -0.2, 1.0, -0.8, 0.5, -1.0, 1.0)
-"""Turns of the held-out loops, from end to end of their range."""
+"""Turns of the held-out loops, with -1 and 1 at the ends of their range."""
 
 
 def legs(turns: Sequence[float], samples: int) -> Array:
@@ -121,7 +122,7 @@ class Case:
 
 
 def case(drive: str, seed: int) -> Case:
-    """The plant of a seed."""
+    """The plant of a seed, and its records."""
     rng = np.random.default_rng([7, list(DRIVES).index(drive), seed])
     second, third, friction = rng.uniform(0.1, 0.3), rng.uniform(-0.05, 0.03), rng.uniform(0.0, 0.004)
     stage = Stage(rng.uniform(0.6, 0.8), second, third, friction)
@@ -140,7 +141,7 @@ def case(drive: str, seed: int) -> Case:
 
 
 def moved(stage: Stage, before: Sequence[float], v: Array) -> Array:
-    """Output units along a drive, in ranges, that comes from elsewhere."""
+    """Output [output units] for a drive v in ranges that comes from the turns `before`."""
     lead = legs([*before, float(v[0])], LEAD)
     first, rest = stage.moved(np.concatenate([lead, v]))
     return 100.0 * (first + rest)[LEAD:]
@@ -162,8 +163,8 @@ def fitted(made: Case, history: tuple[float, ...] | None) -> tuple[float, dict[s
 def open_spread(made: Case, known: bool) -> dict[str, float]:
     """Posterior standard deviation of the held-out outputs, rms over their samples, output units.
 
-    Gaussian: noise as it is; slopes of the start memory over the thresholds as wide as their bounds, +-1; a density of
-    the weights that changes slowly (`SMOOTH`).
+    Everything is Gaussian: noise as in the records; slopes of the start memory over the thresholds with their bound, 1,
+    as standard deviation; a density of the weights that changes slowly (`SMOOTH`).
     """
     r = np.linspace(0.0, 0.5 * HIGH, FINE + 1)
     v = made.record.v
@@ -197,7 +198,7 @@ def open_spread(made: Case, known: bool) -> dict[str, float]:
 
 
 def ratio(other: float, own: float) -> float:
-    """Of two errors with the noise of the records."""
+    """Ratio of two errors, both with the noise of the records."""
     return float(np.hypot(other, NOISE) / np.hypot(own, NOISE))
 
 

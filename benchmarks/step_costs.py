@@ -1,12 +1,12 @@
-"""Measure the dearest sample of emitted models: its instructions, and the bytes of stack of the deepest call.
+"""Measure the most expensive sample of emitted models: its instructions, and the bytes of stack of the deepest call.
 
     python benchmarks/step_costs.py [-o FOLDER] [--jobs 2]
 
-The records are those of `hystgen verify`, and the figures are what it reports: of zig and gcc, and of their builds, the
-larger one, on a Cortex-M0+ without and a Cortex-M4F with an FPU. `plays` are models of so many plays, `effects` the
-same with the effect that takes least; a memoryless part and each part of the code of effects is what a model of
-`CODE_PLAYS` plays takes beyond that. Its stack is that of the whole model. Parts that move or bend plays are measured
-for one play as well. `step_costs.csv` is read by `hystgen.compensator.engines`, for the banner of emitted files.
+Records and figures are those of `hystgen verify`: the largest over the builds of zig and gcc, on a Cortex-M0+ without
+and a Cortex-M4F with an FPU. Rows `plays` are models of plays alone, rows `effects` the same with a gain, the cheapest
+effect. Rows of a memoryless part, or of a part of the code of effects, have the instructions that it adds to a model of
+`CODE_PLAYS` plays, and the stack of the whole model. Parts that move or bend plays are measured for one play as well.
+`hystgen.compensator.engines` reads `step_costs.csv` for the banner of emitted files.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from hystgen.compensator.chain.costs import OPERATORS, PER_PLAY
 from hystgen.model import Model
 
 PLAYS = (1, 4, 16, 64)
-"""[plays] Factors of four, between which `engines.dearest` is straight: engine loop takes so much for each play."""
+"""[plays] Factors of four, between which `engines.dearest` is linear: engine loop costs the same for every play."""
 FEW, MANY = 1, engine_costs.CODE_PLAYS
-"""[plays] The least there is, and those for which code is measured; parts that are paid per play have both."""
+"""[plays] The smallest number, and that at which code is measured; parts with a cost per play are measured at both."""
 SAMPLES = 300
-"""[samples] Of each record: with 1000 the dearest of ten plays takes at most 2 % more (float32 and q31, both cores)."""
+"""[samples] Length of a record: with 1000, ten plays take at most 2 % more (float32 and q31, both cores)."""
 
 Measured = dict[str, tuple[int, ...]]
 """By operator: instructions on each core, then bytes of stack on each."""
@@ -40,7 +40,7 @@ Row = tuple[Any, ...]
 
 
 def worst(model: Model, arithmetic: str, engine: str, operator: str = "both") -> Measured:
-    """The dearest sample and the deepest call of each operator."""
+    """The most expensive sample and the deepest call of each operator."""
     report = hystgen.verify(model, arithmetic, operator, engine, targets=list(engines.CORES), target_length=SAMPLES)
     assert report.ok, report.table()
     found = {}

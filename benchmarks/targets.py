@@ -1,20 +1,20 @@
-"""Instructions per sample on microcontroller cores, counted on emulated ones.
+"""Instructions per sample on microcontroller cores, counted by emulation.
 
     python benchmarks/targets.py [--n 16,128] [--targets cortex-m4f] [--compilers zig,gcc] [-o FOLDER] [--check]
     python benchmarks/targets.py --parts FOLDER/targets.csv ... [-o FOLDER] [--check]
 
-Emitted code of both engines and operators against the textbook loop (`textbook/textbook.c`: formula (35) as ternaries
-with the same care for NaN, range and status), same compiler, flags (-std=c99 -O2) and signal: a decaying multisine over
-the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
-one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; what lies
-near the dearest of these; and the same with a NaN, an infinity or a `commit` before the jump (`interrupted`). A sample
-that is not a number right behind a commit, which sends the answer before the commit once more, is counted apart. So is
-a range that begins where the plays rest, as those of most piezo drives do: from 0 on references may need less than its
-lower end; there some fixed sequences, in which rounding decides whether they do, are run as well. Every answer that is
-counted has been compared with the bit reference.
+Emitted code of both engines and operators is compared with the textbook loop (`textbook/textbook.c`: formula (35) as
+ternaries with the same care for NaN, range and status), built by the same compiler with the same flags (-std=c99 -O2)
+and run on the same signal, a decaying multisine over the range. For engine corners a worst case is constructed as well:
+corner lists of every shape, including the deepest, then a sample that gives the next one more to do (`ways`), then
+jumps to all places; neighbours of the most expensive of these; and the same with a NaN, an infinity or a `commit`
+before the jump (`interrupted`). A NaN or infinity right after a commit, which repeats the answer before the commit, is
+counted separately. So is a drive range from 0, where the plays rest, as most piezo drives have: there references may
+need a drive below the range, and some fixed sequences, in which rounding decides whether they do, are run as well. All
+counted answers are compared with the bit reference.
 
-Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed. All plays, cores and
-arithmetics take hours: `--parts` puts the tables of shorter runs together.
+Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 if a goal is missed. A run over all plays,
+cores and arithmetics takes hours: `--parts` joins the tables of shorter runs.
 """
 
 from __future__ import annotations
@@ -49,21 +49,21 @@ HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
-# A trial with at least this many samples is searched separately. `trials` makes 600 of random turns this long; with 4
-# and 16 plays no other has more than 18 samples, with 128 plays corner lists are on both sides of it
+# Trials of at least this many samples are searched separately. `trials` makes 600 of random turns this long; with 4 and
+# 16 plays no other trial has more than 18 samples, with 128 plays corner lists are shorter as well as longer
 LONG = 100
-# [trials] The next round tries the neighbours of this many, the most expensive. For the inverse of 8 plays in float32
-# on a Cortex-M4F 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`): 30 is three
-# times what was needed, for little more time
+# [trials] The next round tries the neighbours of this many of the most expensive trials. For the inverse of 8 plays in
+# float32 on a Cortex-M4F 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`): 30 is
+# three times what was needed, for little more time
 KEPT = 30
-RANGE = 10.0  # half of it
+RANGE = 10.0  # half of the drive range
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}
 """More signals, over which the corner engine's mean is taken: a multisine in finer and coarser steps, a random walk."""
 BEHIND = "no number behind a commit"
 FROM_0 = "worst case, range from 0"
-# References of a range from 0, each from a reset to 0, that came to lie within a few units in the last place of where a
-# move beside the lower limit ends, so that rounding decides; once such moves were solved twice. The dearest of many
-# that were drawn at random, then and since, which no corner list of the search leads to
+# References for a range from 0, each after a reset to 0, that come within a few units in the last place of the end of a
+# move at the lower limit, so that rounding decides; earlier code solved such moves twice. They are the most expensive
+# of many random sequences, and no corner list of the search leads to them
 TIES = (
     "18.7375355 5.10948849 10.1918678 2.848948 10.0517645 4.80538797 7.58872414 commit 0.270970821 nan 3.26073146",
     "0.011223905 22.659855 5.7992496 1.043483 8.7496727 4.1068497 3.5384128 4.7950592 3.5384142",
@@ -71,7 +71,7 @@ TIES = (
     "0 11.1450024 2.08836651 2.16130733",
     "0 28.8489723 3.55617619",
 )
-# of the textbook loop: what numbers are and what sums are
+# C types of numbers and of sums in the textbook loop
 TYPES = {
     "float32": ("float", "float"),
     "float64": ("double", "double"),
@@ -106,7 +106,7 @@ KINDS = {name: {"str": str, "int": int, "float": float}[str(kind)] for name, kin
 
 @dataclass(frozen=True)
 class Case:
-    """What a build is about."""
+    """What identifies a build."""
 
     target: targets.Target
     compiler: str
@@ -122,13 +122,13 @@ class Case:
 
     @property
     def model(self) -> Model:
-        """What is built."""
+        """The model that is built."""
         return model(self.n, self.middle)
 
 
 @functools.cache
 def model(n: int, middle: float = 0.0) -> Model:
-    """n plays over nine tenths of what a full swing reaches, weights falling, as identified ones do."""
+    """A model with n thresholds up to nine tenths of RANGE and falling weights, like identified ones."""
     thresholds = np.linspace(0.0, 0.9 * RANGE, n + 1)
     weights = np.concatenate([[0.7], 2.4 / n * np.exp(-thresholds[1:] / 5)])
     text = (
@@ -139,10 +139,10 @@ def model(n: int, middle: float = 0.0) -> Model:
 
 
 def multisine(samples: int, stride: int = 1) -> Reals:
-    """Decaying multisine in parts of the range, every `stride`-th of `samples`.
+    """Decaying multisine as a share of RANGE, every `stride`-th of `samples`.
 
-    What a corner list costs on average depends on how finely the drive is sampled, since dear are the samples in which
-    another play begins to follow: with 4000 samples the middle line has 160 a period.
+    The mean cost of a corner list depends on how finely the drive is sampled, since samples in which another play
+    begins to follow are the expensive ones: with 4000 samples the middle line has 160 a period.
     """
     t = np.arange(0, samples, stride) / samples
     lines = ((9, 0.6, 0.0), (25, 0.3, 1.0), (41, 0.1, 2.0))
@@ -151,7 +151,7 @@ def multisine(samples: int, stride: int = 1) -> Reals:
 
 
 def walk(samples: int) -> Reals:
-    """Random walk in parts of the range: the sine of a sum of normally distributed steps of 0.02 (seed 0).
+    """Random walk as a share of RANGE: the sine of a sum of normally distributed steps of 0.02 (seed 0).
 
     Over the range of -10 to 10 a step is about 0.2, and every other one turns. `verify` runs a walk of the same kind.
     """
@@ -167,9 +167,9 @@ def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
 
 
 def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
-    """What the operator is given so that the plays see `drive`, which is about the middle of the range.
+    """Inputs of the operator for which the plays see `drive`, measured from the middle of the range.
 
-    Beyond a range whose ends the reference can ask for less than, the inverse is asked for that much less.
+    In a range from 0, references of the inverse go on beyond the ends of the range with the slope of the first weight.
     """
     drive = case.middle + drive
     if case.operator == "forward":
@@ -181,8 +181,9 @@ def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
 
 
 def blocks(n: int) -> Iterator[list[int]]:
-    """Sizes of the blocks of a corner list, the one with the largest thresholds first: equal ones of 1, 2, 4 .. n
-    plays, and one large block among blocks of one, since a search halves the blocks first and then the plays of one."""
+    """Sizes of the blocks of a corner list, the one with the largest thresholds first: equal blocks of 1, 2, 4 .. n
+    plays, and a large block among single plays, since a search bisects the blocks first and then the plays of a
+    block."""
     size = 1
     while size <= n:
         yield [size] * (n // size)
@@ -194,17 +195,17 @@ def blocks(n: int) -> Iterator[list[int]]:
 
 def corner_lists(n: int) -> Iterator[Reals]:
     """Drives that leave a corner list: swings that take every play along, or rest, then turning points of a shrinking
-    alternating swing, each of which leaves a block behind; each also upside down. What full swings leave, no jump can
-    wipe as a whole; what shorter ones from rest do, one can."""
+    alternating swing, each of which leaves a block behind; all also upside down. No jump can wipe out the whole list
+    that full swings leave, but one can after shorter swings or from rest."""
     r = np.asarray(model(n).cascade.pi.thresholds)
     for sizes in blocks(n):
         turns = n - np.cumsum(sizes[:-1])
-        swing = np.array([r[k] + r[k + 1] for k in turns])  # moves play k and not the next
+        swing = np.array([r[k] + r[k + 1] for k in turns])  # moves play k but not the next
         swing[1::2] *= -1
         lists = [np.concatenate([[RANGE, -RANGE], np.cumsum(swing) - RANGE])]
         if len(turns):
             halved = swing.copy()
-            halved[0] /= 2  # a play at rest follows after once its threshold, after a turn after twice
+            halved[0] /= 2  # from rest a play follows after its threshold, after a turn after twice that
             lists.append(np.append(0.0, np.cumsum(halved)))
         short = np.array([1.8 * r[k] + 0.2 * r[k + 1] for k in turns])
         short = short[short < 1.5 * RANGE]
@@ -225,7 +226,7 @@ def activations(case: Case, points: Reals) -> Reals:
 
 
 def thinned(x: Reals, most: int) -> Reals:
-    """At most `most` of them, both ends included."""
+    """At most `most` of the values, both ends included."""
     return x[np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int)]
 
 
@@ -237,8 +238,8 @@ def landings(case: Case, points: Reals, most: int = 129) -> Reals:
 
 
 def trials(case: Case) -> Iterator[Reals]:
-    """Every corner list, then a jump, since the search for where it leads is the work of a sample."""
-    # first blocks of uneven sizes, which no rule makes: turning points at random, small among large, a few and many
+    """Every corner list followed by a jump: the search for its end is the work of a sample."""
+    # first uneven blocks, which no rule makes: random turning points, small among large, few and many
     rng = np.random.default_rng(11)
     for size in [*rng.integers(4, 12, 2000), *[LONG] * 600]:
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
@@ -251,12 +252,12 @@ def trials(case: Case) -> Iterator[Reals]:
 
 
 def ways(case: Case, points: Reals, hair: float) -> Iterator[Reals]:
-    """Steps on from `points` after which the next sample has more to do before it looks for its own place.
+    """Steps on from `points` after which the next sample has more to do before its own search.
 
-    A sample is fast where the one before it ended in the place that its search had found. That one did not where it led
-    back to the corner that it came from, since no play followed in between; where it asked for less than a `hair`, the
-    finest step of the drive, so that rounding sent the answer nowhere or back; where it met a limit; and where rounding
-    carried the answer to an activation point or across, at the first time or when the same was asked for again.
+    A sample is fast if the previous one ended where its search had led. That fails if the previous one went back to the
+    corner it came from, with no play following in between; if it asked for less than a `hair`, the finest step of the
+    drive, so that rounding left the answer in place or moved it back; if it met a limit; and if rounding carried the
+    answer onto or across an activation point, at once or when the same reference came again.
     """
     at, on = points[-1], 1.0 if len(points) < 2 else np.sign(points[-1] - points[-2])
     first = model(case.n).cascade.pi.thresholds[1]
@@ -273,7 +274,7 @@ def ways(case: Case, points: Reals, hair: float) -> Iterator[Reals]:
 
 
 def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """A trial with a way between what it jumps from and its jump, which then leads anywhere."""
+    """A trial with one of the `ways` before its jump, which then leads to several places."""
     for way in ways(case, trial[:-1], hair):
         points = np.concatenate([trial[:-1], way])
         for jump in landings(case, points, 9):
@@ -281,8 +282,9 @@ def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
 
 
 def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """The end of a trial, which may be all that matters; a trial with other numbers, on which the cost of software
-    floating point depends; with its last jump, or a point shortly before, led elsewhere; and what is longer."""
+    """Variants of a trial: its end, which may be all that matters; slightly different numbers, on which the cost of
+    software floating point depends; another end of its last jump, or another point shortly before; and the `longer`
+    ones."""
     for length in (4, 8, 16, 32, 64):
         if length < len(trial):
             yield trial[-length:]
@@ -303,7 +305,7 @@ def alternating(found: Sequence[Iterable[Reals]]) -> Iterator[Reals]:
 
 
 def within(most: int, found: Iterable[Reals]) -> list[Reals]:
-    """The first of them, with `most` samples together."""
+    """The first trials, with at most `most` samples together."""
     kept = []
     for trial in found:
         most -= len(trial) + 1
@@ -318,7 +320,7 @@ REALS = ("float32", "float64")
 
 @functools.cache
 def lsbs(case: Case) -> tuple[float, float]:
-    """Drive and output of a code; 1 in floating point."""
+    """Drive and output per code; 1 in floating point."""
     if case.arithmetic in REALS:
         return 1.0, 1.0
     form = fixed_tables.build(case.model.cascade, case.arithmetic, "corners", None, None)[1]
@@ -326,7 +328,8 @@ def lsbs(case: Case) -> tuple[float, float]:
 
 
 def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
-    """What the operator takes so that the plays see `drive`, in its own numbers: codes, `coarser` times the finest."""
+    """Inputs of the operator for which the plays see `drive`, in its arithmetic; codes are `coarser` times the
+    finest."""
     x = from_drive(case, drive, call)
     real = ARITHMETICS[case.arithmetic].number
     if real.kind != "i":
@@ -336,15 +339,15 @@ def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
 
 
 def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
-    """Operations, arguments in the operator's own numbers, and where those of each trial end: trials with something
-    between what they jump from and the jump.
+    """Operations, arguments in the operator's arithmetic, and the end of each trial, for trials interrupted before
+    their jump.
 
-    A sample that is not a number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where
-    the answer of the step before the commit is asked for again, which leads where the trial jumps to, and a step from
-    there.
+    Interruptions are a NaN or infinity; a commit of the drive before the jump, with or without a step elsewhere ahead
+    of it; and both: a step to the end of the jump, the commit, a NaN that repeats the answer before the commit, and a
+    step on from there.
     """
     odd = [np.nan, np.inf, -np.inf] if ARITHMETICS[case.arithmetic].number.kind == "f" else []
-    paths: list[Reals] = []  # what the plays see, to know what the inverse has to be asked for
+    paths: list[Reals] = []  # drives that the plays see, from which the references of the inverse follow
     for trial in found:
         paths += [trial, np.append(trial[:-2], trial[-1])]
         paths += [np.append(trial, on) for on in (trial[-2], -trial[-1])]
@@ -389,18 +392,18 @@ def ties() -> tuple[Any, Any]:
 
 
 def behind_commit(call: Any, x: Any) -> Any:
-    """Which operations are steps of what is not a number right behind a commit."""
+    """Which operations are steps of a NaN or infinity right after a commit."""
     return (call == slots.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == slots.OP_COMMIT)
 
 
 def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
-    """Operations, arguments and where those of each trial end, of trials as they are."""
+    """Operations, arguments and the end of each trial, for uninterrupted trials."""
     call, drive = together(found)
     return call, given(case, drive, call=call), list(np.cumsum([len(trial) + 1 for trial in found]))
 
 
 Form = Callable[[Case, Sequence[Reals]], tuple[Any, Any, list[int]]]
-"""What is made of trials: operations, arguments, and where those of each end."""
+"""Makes operations, arguments and the end of each trial from trials."""
 
 
 class Bench:
@@ -430,7 +433,7 @@ class Bench:
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
-        """The loop with its tables; in fixed point with codes of half the finest, so that sums of two fit."""
+        """The loop with its tables; in fixed point codes are twice as coarse, so that sums of two fit."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
         cascade = case.model.cascade
@@ -490,8 +493,8 @@ class Bench:
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
     def worst(self, case: Case) -> list[Figures]:
-        """Engine corners over the worst trials; apart, where there is that, what is not a number behind a commit, and
-        the calls of `commit`."""
+        """Engine corners over the worst trials; separately, if there are any, NaN or infinity right after a commit, and
+        calls of `commit`."""
         image = self.image(case, "corners")
         stack = 0
         steps, returns, calls = [], [], []
@@ -543,20 +546,20 @@ class Bench:
         return core
 
     def _worst_trials(self, case: Case) -> list[Reals]:
-        """The trials with the dearest samples on a Cortex-M4F or, for cores without FPU, on a Cortex-M0+; other cores
-        differ little. What is built is searched, then the neighbours of what is found for dearer ones."""
+        """The trials with the most expensive samples on a Cortex-M4F or, for cores without FPU, on a Cortex-M0+; other
+        cores differ little. Constructed trials come first, then neighbours of the most expensive ones."""
         case = self._searched(case)
         if case not in self._worst:
             real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most, rounds = self._most(case), 6
-            if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
+            if case.arithmetic == "float64":  # slow to run, and takes the same paths
                 classes, rounds = [self._worst_trials(replace(case, arithmetic="float32"))], 1
             else:
                 found = within(SEARCHED // (1 + (most < SEARCHED)), trials(case))
                 classes = [[x for x in found if (len(x) < LONG) == short] for short in (True, False)]
             self._worst[case] = []
-            for found in classes:  # each by itself: the dearest long ones would leave the short ones no room
+            for found in classes:  # separately: the most expensive long ones would crowd out the short ones
                 if rounds > 1:
                     _, found = self._dearest(case, found, 20)
                     found += within(most, alternating([longer(case, trial, hair) for trial in found]))
@@ -564,8 +567,8 @@ class Bench:
         return self._worst[case]
 
     def _worst_interrupted(self, case: Case, behind: bool) -> list[Reals]:
-        """The same of interrupted trials, those that are the worst without among them; `behind`: by the samples that
-        are no number behind a commit, and by all others otherwise."""
+        """The same for interrupted trials, among them the worst uninterrupted ones; `behind`: ranked by a NaN or
+        infinity right after a commit, otherwise by all other samples."""
         case = self._searched(case)
         if (case, behind) not in self._worst_odd:
             real = ARITHMETICS[case.arithmetic].number
@@ -593,7 +596,7 @@ class Bench:
     def _better(
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
     ) -> list[Reals]:
-        """The most expensive of trials and of their neighbours, as long as those are more expensive."""
+        """The most expensive of the trials and their neighbours, searched while the neighbours are more expensive."""
         before, (dear, best) = 0, self._dearest(case, best, KEPT, form, behind)
         for _ in range(rounds):
             if dear == before:
@@ -605,15 +608,15 @@ class Bench:
     def _dearest(
         self, case: Case, found: list[Reals], number: int, form: Form = plain, behind: bool = False
     ) -> tuple[int, list[Reals]]:
-        """Instructions of the most expensive sample, and `number` trials with such samples, the most expensive first,
-        and one of those that jump from the same place."""
+        """Instructions of the most expensive sample, and the `number` most expensive trials, the worst first; of trials
+        that jump from the same place only one is kept."""
         call, x, ends = form(case, found)
         counts = np.zeros(len(call))
         counts[call == slots.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
         counts[behind_commit(call, x) != behind] = 0
         dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
         kept: dict[bytes, Reals] = {}
-        for i in np.lexsort(([len(trial) for trial in found], -np.array(dear))):  # of equally dear ones the shorter
+        for i in np.lexsort(([len(trial) for trial in found], -np.array(dear))):  # shorter ones first among equals
             kept.setdefault(found[i][:-1].tobytes(), found[i])
         return max(dear), list(kept.values())[:number]
 
@@ -627,7 +630,7 @@ def figures_of(
     counts: Any = None,
     stack: int | None = None,
 ) -> Figures:
-    """What was counted and measured; by this core, unless it is given."""
+    """A row of figures; `counts` and `stack` are those of the core unless given."""
     counts = core.counts if counts is None else counts
     return Figures(
         target=case.target.name,
@@ -654,7 +657,7 @@ def measure(
     arithmetics: Sequence[str],
     samples: int,
 ) -> list[Figures]:
-    """Everything that is asked for; compilers that are not installed are left out with a word."""
+    """Figures of all combinations; compilers that are not installed are left out with a message."""
     found: list[Figures] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-bench-") as folder:
         bench = Bench(Path(folder))
@@ -666,7 +669,7 @@ def measure(
                 continue
             for n, arithmetic in itertools.product(plays, arithmetics):
                 began = time.monotonic()
-                # Whoever visits every play does so in every sample: fewer samples give the same figure sooner
+                # A loop visits every play in every sample: fewer samples give the same figure sooner
                 all_of_it = RANGE * multisine(samples)
                 some = all_of_it if target.fpu else RANGE * multisine(samples, stride=max(1, min(n, samples // 100)))
                 for operator in ("forward", "inverse"):
@@ -687,7 +690,7 @@ def measure(
 
 
 def read(paths: Iterable[Path]) -> list[Figures]:
-    """The figures in tables that were written, in the order of a run that measures all of them."""
+    """The figures of written tables, in the order of a run that measures all of them."""
     found = []
     for path in paths:
         with path.open(newline="", encoding="ascii") as file:
@@ -698,13 +701,13 @@ def read(paths: Iterable[Path]) -> list[Figures]:
 
 
 def key(f: Figures) -> tuple[Any, ...]:
-    """What a row of the table is about."""
+    """What identifies a row of the table."""
     return f.target, f.compiler, f.arithmetic, f.operator, f.n
 
 
 def table_text(figures: Iterable[Figures]) -> str:
-    """A row an operator and n: mean / max over the multisine, and the worst cases, of a NaN behind a commit, of a range
-    from 0 on and of a commit too."""
+    """A row for each operator and n: mean / max over the multisine, and the worst cases, also for a NaN after a commit,
+    for a range from 0 and for a commit."""
     rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
     for f in figures:
         rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else f.signal] = f
@@ -739,12 +742,12 @@ GOALS: dict[int, dict[str, float]] = {
     16: {"fine": 28, "coarse": 42, "walk": 112, "worst case": 340, FROM_0: 440, BEHIND: 440, "commit": 440},
     128: {"fine": 32, "coarse": 60, "walk": 136, "worst case": 400, FROM_0: 500, BEHIND: 500, "commit": 500},
 }
-"""Instructions of a float32 inverse on a Cortex-M4F, by plays: means over signals, dearest samples of the others. In a
-range from 0 moves end at a limit."""
+"""Instructions of a float32 inverse on a Cortex-M4F, by number of plays: means over the signals of MEANS, most
+expensive samples of the others. In a range from 0, moves end at a limit."""
 
 
 def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
-    """What the inverse is to reach: words, figure, most allowed."""
+    """Goals for the inverse: words, figure, most allowed."""
     found = {(f.target, f.compiler, f.engine, f.n, f.signal, f.arithmetic): f for f in figures
              if f.operator == "inverse"}  # fmt: skip
 
@@ -768,7 +771,7 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
 
 
 def plot(figures: Sequence[Figures], path: Path) -> None:
-    """Instructions against n, a panel a core, of zig's inverse: textbook loop, both engines, worst case; q31."""
+    """Instructions of zig's inverse against n, a panel for each core: textbook loop, both engines, worst case; q31."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -811,7 +814,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
 
 
 def main() -> int:
-    """Measure, write, print; with --check say by the exit code whether the goals are met."""
+    """Measure, write, print; with --check, the exit code says whether the goals are met."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--n", default=",".join(map(str, PLAYS)), help="plays, comma separated")
     cores = ",".join(core.name for core in targets.TARGETS)

@@ -2,9 +2,9 @@
 
     python benchmarks/walks.py [-v]
 
-Of each run: files of the package in which a function was entered, and doorways, calls that lead from one of them into
-another; with -v the files. What is merely imported does not count, nor does a first run, which fills caches, nor what
-another process does. Compiled functions enter no file that a profiler sees: the bit reference runs as plain Python.
+For each run it prints the number of files of the package in which a function was entered, and of doorways, pairs of
+files of which one calls the other; with -v also the files. Imports do not count, nor does a first run, which fills
+caches, nor do other processes. A profiler sees no compiled functions, so the bit reference runs as plain Python.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ model:
 
 @functools.cache
 def inside(file: str) -> str | None:
-    """The path of a file below the package, None of others; a walk asks at every call, of a few hundred files."""
+    """The path of a file within the package, None for others; cached, since a walk asks at every call."""
     path = Path(file)
     return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else None
 
@@ -77,7 +77,7 @@ def walk(run: Callable[[], object]) -> tuple[list[str], int]:
 
 
 def crept(model: hystgen.Model, path: Path) -> None:
-    """Writes a recording of steps in which the model's output creeps by 3 % with a time constant of 2 s."""
+    """Write a recording of steps in which the model's output creeps by 3 % with a time constant of 2 s."""
     t = 0.05 * np.arange(2000)
     v = 3.5 * np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, 50), 40)
     h = model.simulate(v)

@@ -1,4 +1,4 @@
-"""The figure of docs/corners.md: a drive with its corners, the loop they lie on, and the curve that serves them all.
+"""The figure of docs/corners.md: a drive with its corners, the loop they lie on, and the curve shared by all moves.
 
     python docs/corners.py
 """

@@ -96,7 +96,7 @@ def kind(node: dict[str, Any], names: dict[str, str]) -> str:
 
 
 def limits(node: dict[str, Any]) -> str:
-    """The range of a number, where it is more than what every number has."""
+    """The range of a number; limits that every number has are left out."""
     low, above, high = (node.get(key) for key in ("minimum", "exclusiveMinimum", "maximum"))
     found = []
     if above is not None:

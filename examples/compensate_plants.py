@@ -157,7 +157,8 @@ def held_out() -> Array:
 
 
 def trajectory() -> tuple[Array, int]:
-    """A reference as shares of the output range, and where errors begin to count: after a sweep of the whole range.
+    """A reference as shares of the output range, and the sample from which errors count, after a sweep of the whole
+    range.
 
     The sweep wipes out the start of plant and compensator. What counts is three swelling sines and a staircase.
     """

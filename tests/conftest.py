@@ -20,24 +20,24 @@ settings.load_profile("hystgen")
 pytest_plugins = ["processor_time"]
 
 MEASURED = Path(os.environ.get("HYSTGEN_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
-"""Folder of the measured records, which the project does not ship: not all of them may be passed on."""
+"""Folder of the measured records. The project does not ship them because some may not be redistributed."""
 
 WHOLE = bool(os.environ.get("HYSTGEN_WHOLE"))
-"""Whether tests marked `slow` are to run with all their cases."""
+"""Whether tests marked `slow` run all their cases."""
 
 NO_DATA = f"marked data, and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another"
 SHORTENED = "marked slow; HYSTGEN_WHOLE=1 runs all"
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
 GARBAGE = 50_000, 20, 20
-"""[objects, collections, collections] How rarely unreachable cycles are sought, instead of 700, 10, 10. That took 13 %
-of the time of compiling a step and 8 % of a diagnosis, and now takes 4 % and 3 %, for 30 MB more a process. Set by:
+"""[objects, collections, collections] Thresholds of the garbage collector, instead of 700, 10, 10. Collecting took 13 %
+of the time of compiling a step and 8 % of a diagnosis; it now takes 4 % and 3 %, for 30 MB more per process. Set by:
 `gc.callbacks` around the first inverse step of `bent` in float32, and around the blocks of docs/howto/diagnose.md."""
 
 
 @pytest.fixture(scope="session")
 def chromium() -> str:
-    """The browser in which pages are looked at; CI has to have it."""
+    """Path of the browser that renders the pages. Without one the test is skipped, or fails in CI."""
     found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if found is None:
         if os.environ.get("CI"):
@@ -54,7 +54,7 @@ def measured() -> Path:
 
 @pytest.fixture
 def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """The command line: exit code, standard output, standard error."""
+    """Run the command line and return its exit code, standard output and standard error."""
 
     from hystgen.cli import main
 
@@ -63,7 +63,7 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         with pytest.raises(SystemExit) as stopped:
             main([str(a) for a in arguments])
         out, err = capfd.readouterr()
-        # Kernels may have to be compiled first, which is reported
+        # Compiling kernels is reported on standard error
         printed = [line for line in err.splitlines() if not line.startswith("compiling")]
         return int(stopped.value.code or 0), out, "\n".join(printed)
 
@@ -72,8 +72,8 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
 
 @pytest.fixture(autouse=True, scope="session")
 def _short_records() -> None:
-    """Compile for more samples than a user's process does: few tests run as many, and each function would be compiled
-    in four types."""
+    """Raise the number of samples from which functions are compiled: few tests have enough samples to repay compiling
+    each function for four types."""
     from hystgen.basics import jit
 
     jit.SHORT = 10 * jit.SHORT
@@ -81,8 +81,8 @@ def _short_records() -> None:
 
 @pytest.fixture
 def brief(request: pytest.FixtureRequest) -> Iterator[bool]:
-    """Whether `make test` runs; models with effects are then computed in Python, which for short records takes less
-    than to compile their functions."""
+    """Whether this is `make test`. Models with effects then run in plain Python, which on short records is faster than
+    compiling their functions."""
     from hystgen.basics import jit
 
     briefly = request.config.option.markexpr == "not thorough"
@@ -99,7 +99,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # before -m looks at the marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect what cannot run without the measured records, and part of what is slow: neither passed nor skipped.
+    """Deselect tests that need missing measured records, and some slow ones; they count as neither passed nor skipped.
 
     One case in n of a test marked `thorough(but_one_in=n)` loses that mark, so that `make test` runs it."""
     for item in items:
@@ -118,13 +118,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """Modules and tests stay until the end; no collection has to look at them."""
+    """Keep the garbage collector from scanning modules and tests, which live until the end."""
     gc.collect()
     gc.freeze()
 
 
 def in_short_form(item: pytest.Item) -> bool:
-    """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number."""
+    """Whether a test runs without HYSTGEN_WHOLE. Of a slow test one case in `one_in` runs, or none without that."""
     slow = item.get_closest_marker("slow")
     if slow is None:
         return True
@@ -132,9 +132,9 @@ def in_short_form(item: pytest.Item) -> bool:
 
 
 def place(item: pytest.Item) -> int:
-    """The sum of the places of a case's parameters in their lists.
+    """Sum of the indices of a case's parameters in their lists.
 
-    Taking every n-th sum pairs each value of one list with every n-th value of another.
+    Running every n-th sum pairs each value of one list with every n-th value of another.
     """
     assert isinstance(item, pytest.Function)
     places = 0
@@ -146,7 +146,7 @@ def place(item: pytest.Item) -> int:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    # A process of pytest-xdist hands its count to the one that prints
+    # A worker of pytest-xdist passes its count to the process that prints
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["left_out"] = session.config.stash[LEFT_OUT]
 

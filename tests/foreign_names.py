@@ -1,18 +1,18 @@
-"""Names that common headers define as macros: emitted C uses none of them, whichever header comes before it.
+"""Names that common headers define as macros. Emitted C uses none of them, so any header may be included before it.
 
-From the headers as published: Arduino.h, binary.h, Print.h and WString.h of arduino/ArduinoCore-avr and
+Taken from the published headers: Arduino.h, binary.h, Print.h and WString.h of arduino/ArduinoCore-avr and
 Arduino_Core_STM32; minwindef.h, rpcndr.h, windef.h and winnt.h of mingw-w64; core_cm*.h of ARM-software/CMSIS_5 and
 CMSIS_6 with the device headers of STMicroelectronics/STM32CubeF4; sys/util.h, sys/util_macro.h and toolchain.h of
-zephyrproject-rtos/zephyr; esp_bit_defs.h and esp_attr.h of espressif/esp-idf; the language extensions that compilers of
-IAR, TI and Microchip (XC8) take as keywords. Of names beyond macros, types and enumerators that -Wshadow would report.
-`test_foreign_names.py` asks those headers themselves that a tool of the tests ships: Windows, AVR, C and POSIX.
+zephyrproject-rtos/zephyr; esp_bit_defs.h and esp_attr.h of espressif/esp-idf; the keywords of the language extensions
+of the IAR, TI and Microchip (XC8) compilers. Types and enumerators are listed too if -Wshadow would report them.
+`test_foreign_names.py` reads the headers of Windows, AVR, C and POSIX directly, since tools of the tests ship them.
 """
 
 from __future__ import annotations
 
 
 def words(text: str) -> frozenset[str]:
-    """The words of a text."""
+    """Set of the words of a text."""
     return frozenset(text.split())
 
 

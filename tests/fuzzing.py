@@ -1,4 +1,4 @@
-"""Fuzzing of the emitted C with libFuzzer, and the replay of what it found through the bit reference."""
+"""Fuzzing of the emitted C with libFuzzer, and replay of the inputs it kept against the bit reference."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CALLS = {
     "commit": slots.OP_COMMIT,
 }
 SETTINGS = ("push", "settle", "set_offset", "set_temperature", "set_gain")
-"""Calls of models with effects that are fuzzed, with an argument of any kind."""
+"""Calls of models with effects that are fuzzed with arbitrary arguments."""
 
 SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = ["-std=c99", "-g", "-O1", f"-fsanitize=fuzzer,{SANITIZERS}", "-fno-sanitize-recover=all"]
@@ -41,12 +41,12 @@ SEEDS = 16
 
 
 class FuzzError(AssertionError):
-    """A crash, a sanitizer's report, or an answer that is not the reference's."""
+    """A crash, a sanitizer report, or an answer that differs from the reference's."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A fuzzer of both operators of a model; in fixed point of both engines side by side, which have to agree."""
+    """A fuzzer of both operators of a model; in fixed point it runs both engines, whose answers must agree."""
 
     model: Model
     arithmetic: str
@@ -55,11 +55,11 @@ class Target:
 
     @cached_property
     def numbers(self) -> Any:
-        """What the reference computes with."""
+        """Tables that the reference computes with."""
         return self.model.tables(self.arithmetic, self.engine)
 
     def run(self, corpus: Path, seconds: float) -> str:
-        """Fuzz, keeping in `corpus` what reached something new. Returns libFuzzer's figures. Raises FuzzError."""
+        """Fuzz, keeping inputs with new coverage in `corpus`. Returns libFuzzer's statistics. Raises FuzzError."""
         artifacts = corpus.parent / "found"
         shutil.rmtree(artifacts, ignore_errors=True)
         artifacts.mkdir()
@@ -88,22 +88,22 @@ class Target:
         return sum(self._compare(file.name, text) for file, text in zip(files, inputs, strict=True))
 
     def _called(self, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-        # A process's peak memory starts at its parent's, which libFuzzer would count; that of a shell is small
+        # libFuzzer counts peak memory, which a child inherits from its parent: a shell has little, pytest much
         return subprocess.run(
             ["sh", "-c", '"$@"; exit $?', "sh", self.binary, *arguments],
             capture_output=True, text=True, errors="replace", check=False, env={**os.environ, **environment},
         )  # fmt: skip
 
     def _logged(self, *inputs: Path) -> tuple[subprocess.CompletedProcess[str], list[str]]:
-        """The calls of each input, of one that crashes those up to there; none where it crashed before the first."""
+        """Logged calls of each input, up to a crash if there is one; an empty list if it crashed before the first."""
         log = inputs[0].parent.parent / "calls.txt"
         log.write_text("")
         done = self._called(*inputs, HYSTGEN_FUZZ_LOG=str(log))
-        # before several inputs libFuzzer runs an empty one
+        # libFuzzer runs an empty input before several inputs
         return done, log.read_text().split("input ")[1:][-len(inputs) :]
 
     def _compare(self, name: str, calls: str) -> int:
-        """Raises FuzzError for the first answer, or bits that were read, other than the reference's."""
+        """Compare one input. Raises FuzzError for the first answer or status that differs from the reference's."""
         operator, *lines = calls.splitlines()
         inverse = operator == "1"
         rows = [[int(number) for number in line.split()] for line in lines]
@@ -111,7 +111,7 @@ class Target:
         call = table[:, 0].astype(np.uint8)
         real = ARITHMETICS[self.arithmetic].number
         x, answer = (table[:, i].astype(f"u{real.itemsize}").view(real) for i in (1, 2))
-        with np.errstate(invalid="ignore"):  # a signalling NaN that changes its type
+        with np.errstate(invalid="ignore"):  # converting a signalling NaN warns
             expected = comparison.expected_record(self.numbers, real, inverse, (name, call, x))
         bits = f"u{real.itemsize}"
         wrong = answer.view(bits) != expected.answer.view(bits)
@@ -140,8 +140,8 @@ def build(
     engine: str,
     change: Callable[[str], str] = lambda text: text,
 ) -> Target:
-    """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines, but models with
-    effects only if `engine` is corners, since some have loop alone."""
+    """Emit a model, apply `change` to its C, and build its fuzzer. In fixed point both engines are built; for models
+    with effects only if `engine` is corners, since some have only loop."""
     clang = compilers.find("clang")
     assert clang, "clang is not installed"
     real = ARITHMETICS[arithmetic].number
@@ -181,7 +181,7 @@ def build(
 
 
 def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple[int, str]]]:
-    """Codes and names of the settings that each operator has."""
+    """Codes and names of each operator's settings."""
     calls = module.of(model.parameters, model.cascade, Options("both", arithmetic, engine, "self-contained")).calls
     return {
         op: [(SETTING_CALLS[each], each) for each in SETTINGS if each in calls.get(op, ())]
@@ -190,7 +190,7 @@ def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple
 
 
 def seed(corpus: Path) -> None:
-    """Random sequences of calls to begin with, a few of each length."""
+    """Fill a new corpus with random call sequences, two of each length."""
     corpus.mkdir()
     rng = np.random.default_rng(4)
     for number in range(SEEDS):

@@ -1,9 +1,9 @@
-"""What proofs take for granted, written into the emitted C: of a corner list, and of the states of effects.
+"""Facts that the proofs assume about corner lists and states of effects, written into the emitted C as checks.
 
-Two facts are relations between numbers of the whole list, which Eva's sets of values cannot hold: the last plays of the
-blocks fall strictly from corner to corner, so that there are no more corners than plays; and a sum of products, or a
-way, is one of plays that can be so far apart, so that it stays below the bound that the format was chosen by. Here they
-become checks at the places where they are needed: Eva takes each for true, a run stops where one is not.
+Two of them relate numbers of the whole list, which Eva's value sets cannot express. The last plays of the blocks fall
+strictly from corner to corner, so there are no more corners than plays. And plays can only be so far apart, so sums of
+products and ways of the input stay below the bound that the format was chosen by. Each check stands where the fact is
+needed: Eva assumes it, and a run stops where it fails.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ extern void not_granted(int line);
 #define WITHIN(x, most) GRANTED((x) >= -(most) && (x) <= (most))
 """
 
-# What stands in the emitted C, how often, and what takes its place. The list:
+# Pattern in the emitted C, number of occurrences, and replacement. The list of corners:
 PLACES = [
     (
         r"(\w+ void NAME_leave_corner\([^{]*\{\n)",
         1,
         r"\1    GRANTED(here->depth < PLAYS);\n    WITHIN(here->output, HELD);\n",
     ),
-    # bisection is looked at for each number of corners on its own
+    # Eva analyses the bisection separately for each number of corners
     (r"(    unsigned int left = here->depth;\n    unsigned int k = here->k;\n)", 1, r"\1    /*@ split left; */\n"),
     # sums and ways
     (r"(    kink->output = NAME_begins\(.*;\n)", 1, r"\1    WITHIN(kink->output, SUM);\n"),
@@ -49,7 +49,7 @@ PLACES = [
     (r"(        here->output = here->rising \? here->output .*;\n)", 1, r"\1        WITHIN(here->output, SUM);\n"),
 ]
 
-# Of modules without a memoryless part, whose usual sample does not look at the list
+# Modules without a memoryless part, whose usual sample does not read the list
 USUAL_PLACES = [
     (r"(    const uint32_t room = [^;]*;\n)", 1, r"\1    GRANTED(room <= WAY);\n"),
     (
@@ -73,7 +73,7 @@ USUAL_PLACES = [
 
 
 def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
-    """The emitted C with the checks in it; `sums` divides the bound of all sums."""
+    """The emitted C with the checks added; `sums` divides the bound of all sums."""
     parameters, name = model.parameters, model.parameters.name
     tables, form = build(
         model.cascade, arithmetic, "corners", parameters.emit.drive_lsb, parameters.emit.output_lsb
@@ -98,27 +98,27 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
     return BEFORE + text
 
 
-# In models with effects: what states stay within, and relations between two numbers. Eva's sets of values widen a state
-# until it overflows, and keep no relation. Where each fact comes from:
-# SIGNAL   the range analysis that the formats were chosen by, for what goes from block to block
-# CREEP    a state of creep is its weight times a mean of all inputs with no share below 0; `creep.guard` leaves 49 bits
-#          and those dropped for the sum of all states, and a bit more is for rounding
+# In models with effects: bounds of states, and relations between two numbers. Eva's value sets widen a state until it
+# overflows, and keep no relations. The reason for each bound:
+# SIGNAL   signals between blocks stay in the range that the formats were chosen by
+# CREEP    a state of creep is its weight times a weighted mean of all inputs, with no negative share; `creep.guard`
+#          leaves 49 bits and the dropped ones for the sum of all states, plus one bit for rounding
 # PART, WHOLE, GAINED   the clock of a drift counts a parabola over its samples exactly: `clock`
-# RISE     own heat adds no more in a sample than the warmest temperature loses, which has RISE_BITS; a bit more is for
-#          rounding
-# RUBBED   a play that rubs stays between the drives that it has seen
-# AMOUNT   so that none goes farther than from one to the other in a step; the first n odd numbers are n^2 in all
-# INVERSE  a step of Newton's from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
-# PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
-#          input's ends; one that would come too near to another stops in between
-# INPUT    halves lie between the ends that a search begins with
-# DRAWN    a play that its input draws along, at once or by a dashpot, ends between where it was and that input, and so
+# RISE     self-heating adds no more in a sample than the highest temperature loses, which has RISE_BITS; one more bit
+#          is for rounding
+# RUBBED   a rubbing play stays between the extreme drives that it has seen
+# AMOUNT   hence it moves by at most the distance of those drives in a step; the first n odd numbers add up to n^2
+# INVERSE  a Newton step from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
+# PLAY     a viscous play moves towards the play without viscosity, so it stays between the start memory and the ends
+#          of the input; a play that would come too near to another stops in between
+# INPUT    a bisection stays between the ends that it begins with
+# DRAWN    a play drawn by its input, at once or by a dashpot, ends between its old position and that input, and so
 #          does an input that counts as standing still on its way
-# ASKED    what is asked of a lag, a third of the size that its states were given room for at most
-# MOVED    what is asked of a lag in front of two branches moves from end to end of the drives at most
-# COARSE   numbers that a lead is searched with are cut off there, and the search begins with a size and a lead above it
-# LOST     what rounding to whole numbers leaves
-# REST     what rounding to a code leaves of a drive at a limited rate, at most half of one
+# ASKED    the drive asked of a lag is at most a third of the size that its states have room for
+# MOVED    the drive asked of a lag in front of two branches moves at most from one end of the drives to the other
+# COARSE   numbers in the search for a lead are limited to this, and the search begins with a size and a lead above it
+# LOST     remainder of rounding to whole numbers
+# REST     remainder of rounding a rate-limited drive to a code, at most half a code
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
     r"    WITHIN(self->whole, WHOLE);\n    WITHIN(self->gained, GAINED);\n"
@@ -179,14 +179,14 @@ STATES = [
      r"        search->input = (NAME_play_t)between;\n"),
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
-    # no facts, but where Eva is to stop widening, and what it is to look at case by case
+    # not facts: where Eva should stop widening, and what it should analyse case by case
     (r"(    for \(bits = \w+; bits > 0; bits /= 2u\) \{\n)", r"    /*@ loop unroll 6; */\n\1"),
     (r"(        const bool before = inside < ([^;]*);\n)", r"        /*@ split inside < \2; */\n\1"),
 ]  # fmt: skip
 
 
 def clock(table: tuple[int, ...]) -> dict[str, int]:
-    """What a clock with this table counts to at most: a parabola over its samples, where it turns and where it ends."""
+    """Largest counts of a clock with this table: those of a parabola over its samples, at its turn and at its end."""
     slope, change, samples, _, bits, *_ = table
     turn = -slope // change if change else 0
     counts = [samples, *(n for n in range(turn, turn + 3) if 0 <= n <= samples)]
@@ -195,8 +195,8 @@ def clock(table: tuple[int, ...]) -> dict[str, int]:
 
 
 def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") -> str:
-    """The emitted C of a model with effects with the checks in it that its blocks need; `wrong`: a number of which a
-    64th is taken."""
+    """The emitted C of a model with effects with the checks that its blocks need; `wrong` names a bound to divide by
+    64."""
     t, codes = compiled.tables, compiled.codes
     assert codes is not None
 

@@ -1,4 +1,4 @@
-"""Hypotheses, drives and results made up for tests of the diagnosis, of which the answers are known."""
+"""Made-up hypotheses, drives and results with known answers, for tests of the diagnosis."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ NOISE, HIDDEN = 0.02, 1.0
 
 
 def missing(record: int, samples: int = 2000) -> Array:
-    """What the effects leave where they are missing: slow against a sample."""
+    """Error of a record without any effect; it varies slowly from sample to sample."""
     return np.asarray(HIDDEN * np.sin(0.05 * np.arange(samples) + record))
 
 
 class Hypothesis:
-    """Effects that are in, and the error that they leave: a share of what is missing, and noise of its own colour."""
+    """A set of effects and the error it leaves: a share of `missing`, plus the world's noise."""
 
     def __init__(self, world: World, names: frozenset[str], left: float | None = None) -> None:
         self.world, self.names = world, names
@@ -50,7 +50,7 @@ class Hypothesis:
 
 
 class World:
-    """Which hypotheses there are, and how much of what is missing each leaves; those not listed leave everything."""
+    """The share of `missing` that each set of effects leaves; sets that are not listed leave all of it."""
 
     to_fit, held, noise = (0, 1, 2), (3, 4, 5), NOISE
     one_loop = one_speed = False
@@ -95,13 +95,14 @@ TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
 RECORDS: Any = SimpleNamespace(
     to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0, terms=lambda now, _: [now]
 )
-"""Of which nothing is known but who left what."""
+"""Records of which only the errors left by each option are known."""
 
 
 class Made:
-    """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
-    the other option's; `most`: whether its amount is the largest that is tried; `levels_off`: as
-    in a candidate, whose numbers are all 0."""
+    """An option with the errors it leaves of fitted and of held-out records.
+
+    `on_equal_terms`: errors with the other option's free terms; `most`: whether its amount is at its upper bound;
+    `levels_off`: as in a candidate."""
 
     def __init__(
         self,
@@ -133,7 +134,7 @@ class Made:
 
 
 def first_of(best: Made, other: Made, effect: str | None = None) -> str:
-    """Which of two is taken; `effect`: of which both are shapes."""
+    """Name of the option that is taken; `effect`: the effect that both are shapes of, if any."""
     tried: list[Any] = [
         screening.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
@@ -160,7 +161,7 @@ STRUCTURE = Structured(0.05, 2.5, None, {}, None, None, None, None, ())
 
 
 def sweep(*ends: float, seconds: float = 1.0, noise: float = 0.0) -> Item:
-    """Straight moves between drives, 200 samples each."""
+    """Straight moves between these drives, 200 samples each."""
     v = np.interp(np.arange(200 * (len(ends) - 1) + 1) / 200, np.arange(len(ends)), ends)
     v = v + np.random.default_rng(1).normal(0.0, noise, len(v))
     run = Run(np.arange(len(v)) * seconds / 200, v)

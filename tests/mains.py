@@ -1,4 +1,4 @@
-"""The C program that runs recorded calls of an emitted operator, shared by the tests that watch it."""
+"""A C program that replays recorded calls of an emitted operator, shared by tests that observe its run."""
 
 _MAIN = """\
 #include "{name}.h"
@@ -26,7 +26,7 @@ int main(void)
 
 
 def c_main(name: str, op: str) -> str:
-    """Its text for operator `op` of the model `name`; of each call it reads a byte, from 128 on with the status unread,
-    and a number for the argument."""
+    """Text of the program for operator `op` of the model `name`. For each call it reads a byte, 128 or more if the
+    status is not to be read, and a number for the argument."""
     commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
     return _MAIN.format(name=name, op=op, commit=commit)

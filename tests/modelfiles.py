@@ -1,4 +1,4 @@
-"""Parameter files that the tests share: few and diverse."""
+"""A few diverse parameter files that the tests share."""
 
 PLAYS = """
   pi:
@@ -57,11 +57,11 @@ BRANCHES = (
 
 
 ALLOWED = "emit: {compensation: {noise_gain: 1.0e+4}}\n"
-"""For inverses whose noise gain is above what is emitted unasked; more than any here has, so that nothing averages."""
+"""Allows a noise gain above that of any inverse here, so that all are emitted and none averages references."""
 
 
 def chain(name: str, *effects: str, front: str = "", compensate: str = "") -> str:
-    """A model with effects, a sample a millisecond; `compensate`: of those that nothing measures."""
+    """A model with effects, sampled at 1 kHz; `compensate`: effects to compensate although nothing measures them."""
     asked = f"emit: {{compensation: {{compensate: [{compensate}]}}}}\n" if compensate else ""
     return (
         head(name) + PLAYS + front + "  output_offset: 0.5\n  effects:\n"
@@ -109,27 +109,27 @@ CHAINS = {
                         "name: slew_limit, rate: 3000", "name: ageing, loss: 0.01, travel: 100",
                         "name: thermal, gain_per_degree: 0.001", front=BRANCHES) + ALLOWED,
 }  # fmt: skip
-"""Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
+"""Models with effects: every block, in each of its kinds. Those of INVERSE_ALONE are emitted as an inverse only."""
 
 LED = {"led": chain("led", "name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]")}
-"""Of which in q31 the signal in front of the plays has bits below their input, which matters to engine corners."""
+"""A model whose signal in front of the plays has in q31 more bits than their input, which matters to engine corners."""
 
 BRAKED = chain("braked", "name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300")
-"""A lag behind a slew limit, kept from overshooting."""
+"""A lag behind a slew limit, braked so that it does not overshoot."""
 
 STEADY = chain("steady", "name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300",
                front=BRANCHES)  # fmt: skip
-"""The same in front of two branches, from which its lag never goes back."""
+"""The same in front of two branches, where the lag must never reverse."""
 
 CALM = chain(
     "calm", CREEP, "name: lag, time_constant: 0.01", "name: slew_limit, rate: 3000", "name: delay, time: 2.0e-3"
 ) + "emit: {compensation: {quiet: true, noise_gain: 1000}}\n"
-"""A drive that stands still at rest, behind a brake and a preview."""
+"""A model whose drive stands still at rest, with a braked lag and a preview."""
 
 NOTCHED = {
     "notched": chain("notched", "name: resonance, frequency: 60, damping: 0.05", "name: lag, time_constant: 0.01")
     + "emit: {compensation: {resonance: notch, noise_gain: 20}}\n"
 }
-"""A notch and averages that hold the noise gain, all of references that are past."""
+"""A notch, and averages that limit the noise gain, both over past references only."""
 
 INVERSE_ALONE = ("viscous_twin",)

@@ -1,6 +1,6 @@
-"""Mutants of the run time: small faults that `verify` has to find, and those that are none.
+"""Mutants of the run time: small faults that `verify` has to find, and equivalent mutants.
 
-Data to be amended with the sources: `old` has to stand in the file, once unless `count` says otherwise.
+Change them together with the sources: `old` must occur in the file, once unless `count` says otherwise.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ MODELS = {
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit
     "reset_low": head("reset_low", -2.75, 6) + ROUND + "    initial_state: -2\n",
-    # drive codes so coarse that rounding to one leads past where a steep play starts to follow
+    # drive codes so coarse that rounding skips the place where a steep play starts to follow
     "coarse": head("coarse") + STEEP + "emit: {drive_lsb: 0.0371}\n",
     "coarse_listed": head("coarse_listed")
     + PLAYS
     + "    initial_state: [0, 0.3, 0.1, -0.2, 0.3, 0.5, 0.1]\nemit: {drive_lsb: 0.0371}\n",
-    # the last drive code and the most that the envelope gives lie closer together than half a code
+    # the last drive code and the largest output of the envelope lie less than half a code apart
     "flat_high": head("flat_high") + FLAT.format("6") + "emit: {drive_lsb: 1.3}\n",
     "flat_low": head("flat_low") + FLAT.format("-5.7") + "emit: {drive_lsb: 1.3}\n",
-    # a reset leads beyond what output codes were chosen for, of the second at high drives alone
+    # a reset leads beyond the range of the output codes, in the second model only at high drives
     "far_low": head("far_low", 0, 1)
     + "\n  pi: {thresholds: [0, 200], weights: [1, 1], initial_state: 50}\n  output_offset: -50\n",
     "near_high": head("near_high", 0, 10)
@@ -67,7 +67,7 @@ MODELS = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change of one file, and a model with arithmetic in which it shows."""
+    """A change of one file, and a model and an arithmetic in which it shows."""
 
     what: str
     file: str
@@ -307,7 +307,7 @@ def _of_loop(what: str, file: str, old: str, new: str, model: str, arithmetic: s
     return Mutant(what, f"{folder}/{file}", old, new, model, arithmetic, "loop", count)
 
 
-# Of the files that models with effects are made of, one at least of each
+# At least one mutant of each file that models with effects are made of
 OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("a limited output code drops status", "compensator/chain/signals.c", "*status |= ", "*status = ", "quick", "q31"),
     ("travel loses the remainder", "effects/ageing/ageing.c", "self->low = change - (next - high);",
@@ -475,9 +475,9 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "v + (hystgen_reach_t)", "v + 0 * (hystgen_reach_t)", "late", "q31"),
 )))  # fmt: skip
 
-# No record can find these, for the reasons given; a difference would show that a reason is wrong.
+# No record can find these, for the reasons given; if one does, the reason is wrong.
 EQUIVALENT = (
-    # The limit is a drive code itself: nothing before it is rounded to one beyond.
+    # The limit is itself a drive code, so no drive below it is rounded to a code beyond.
     *(
         Mutant(
             "the limit's edge without shy", USUAL, "((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;",
@@ -485,7 +485,7 @@ EQUIVALENT = (
         )
         for name, bits in (("coarse", "q15"), ("edge", "q15"), ("above", "q31"))
     ),
-    # A corner that is not passed lies beyond the place: where its own play begins to follow is not reached either.
+    # The corner was not passed, so the place where its own play begins to follow is not reached either.
     *(
         Mutant(
             "the last play of an open corner is searched for too", CORNERS, "unsigned int last = top->top - 1u;",
@@ -493,7 +493,7 @@ EQUIVALENT = (
         )
         for name, bits in (("plain", "q31"), ("listed", "q15"))
     ),
-    # Segments meet at a kink: either of them leads on from there.
+    # Two segments meet at a kink, and either gives the same answer there.
     *(
         Mutant(
             "at a kink the play above does not follow yet", CORNERS, "                on >= (by_output",
@@ -501,7 +501,7 @@ EQUIVALENT = (
         )
         for name, bits in (("plain", "q31"), ("coarse", "q15"))
     ),
-    # Where the same plays are known to follow, a search finds that they do.
+    # The shortcut for a step with the same plays gives what a search would find.
     *(
         Mutant(
             "no step is known to have the same plays", CORNERS, "    if (to < next) {",
@@ -509,7 +509,7 @@ EQUIVALENT = (
         )
         for name, bits in (("two_branches", "q31"), ("bent", "q15"))
     ),
-    # That a drive is where solving has put it saves a search, which would find the same place.
+    # Reusing the place where solving has put a drive saves a search that would find the same place.
     *(
         Mutant(
             "every drive is searched for", CORNERS, "if (moved < 0 || kink->output",
@@ -517,33 +517,33 @@ EQUIVALENT = (
         )
         for name, bits in (("outside", "q15"), ("listed", "q31"), ("two_branches", "q15"))
     ),
-    # Every place of a ring at rest holds the same drive.
+    # At rest every place of the ring holds the same drive.
     _of_loop("the ring begins elsewhere", "effects/delay/delay.c", "*oldest = 0;", "*oldest = 1u;", "late", "float32"),
-    # Past the last piece travel stays where it is, and every move is cut anew.
+    # Past the last piece the travel no longer changes, and every move is cut off again.
     _of_loop("a cut move leaves all of it", "effects/ageing/ageing.c",
              "        change = next - high;\n", "", "worn", "float32"),
-    # The temperature is limited to where the gain is.
+    # The temperature is already limited to the range in which the gain is inside its limits.
     _of_loop(
         "a limited gain is not told", "effects/thermal/gain.c", "return inside < gain || inside > gain;",
         "return inside < gain && inside > gain;", "warm", "float32",
     ),
-    # A direction is sought before any is asked for.
+    # The direction is found before it is first used.
     _of_loop("a lag at rest falls", "effects/lag/steady.c",
              "self->rises = true;", "self->rises = false;", "steady", "float32"),
-    # Without steps that are held every drive is either solved for or settled at.
+    # Without held steps every drive is either solved for or settled.
     _of_loop(
         "a lead is used twice, fixed", "effects/lag/lag_fixed.c",
         "    self->lead -= hystgen_lag_scaled(t, change, &t->rate);\n", "", "led", "q31",
     ),
 )  # fmt: skip
 
-# Where adding a status bit is the same as setting it, since no other can be set before. A reference that was limited
-# lies where a drive inside its range leads, so that no envelope limits it too; of a forward operator in fixed point
-# whose outputs all are codes the limit of the drive is the only bit.
+# Places where setting a status bit equals adding it, since no other bit can be set before. A limited reference has a
+# drive inside the range, so no envelope limits it again; and in a forward operator in fixed point whose outputs are all
+# codes, the limit of the drive is the only bit.
 NO_DRIVE = "self->bits |= HYSTGEN_STATUS_DOMAIN;"
 LIMITED_DRIVE = ("forward_step", "self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;")
 
-# Models that add status bits wherever a file of the run time does, but chain_fixed.c
+# Models that together add status bits at every place where the run time does, except in chain_fixed.c
 STICKY: list[tuple[str, str, str, set[tuple[str, str]]]] = [
     ("outside", "float32", "corners", set()),
     ("near_high", "q15", "corners", set()),

@@ -1,4 +1,4 @@
-"""An effect of one's own that has no compensator: the offset of a heated neighbour that follows a duty cycle."""
+"""A user's own effect without a compensator: the offset caused by a neighbour heated in a duty cycle."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Neighbour(Effect):
             return cls(name="user:neighbour", amplitude=unit * float(x[0]), period=float(10.0 ** x[1]))
 
         low, high, start = np.array([-20.0, last - 1.0]), np.array([20.0, last + 1.0]), np.array([1.0, last])
-        # A search finds the period only from near by: one start every 12 %
+        # A search finds the period only from a start close to it: one start every 12 %
         others = tuple(np.array([1.0, last + shift]) for shift in np.arange(-1.0, 1.0, 0.05))
         none = np.array([0.0, last])
         return [Candidate("user:neighbour", low, high, start, build, none, others, amounts=(0,))]

@@ -1,10 +1,10 @@
-"""Processor time of a run of the tests: by file and by kind at the end of the run, by test in the file of `--cpu`.
+"""Processor time of a test run: by file and kind at the end of the run, and by test in the file of `--cpu`.
 
     python -m pytest --cpu build/cpu.csv ..
 
 Kinds are `python`, `numba` (compiling), and the command of each process that a test waited for; processes of a pool
-count as `python`. A fixture of several tests is charged to the first of them. Without `--cpu`, what is compiled in the
-test that imports numba counts as `python`: the import takes too long for a run of few tests.
+count as `python`. A fixture of several tests is charged to the first of them. Without `--cpu`, compiling in the test
+that imports numba counts as `python`, because importing it early would slow down a run of few tests.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Times:
 
     @contextlib.contextmanager
     def of(self, test: str) -> Iterator[None]:
-        """Charge what is used meanwhile to a test."""
+        """Charge the processor time used in this context to a test."""
         self._kinds.clear()
         self._listen()
         before = used()
@@ -54,7 +54,7 @@ class Times:
         self._kinds[command] += seconds
 
     def _listen(self) -> None:
-        """Have numba say when it compiles, once it is imported."""
+        """Measure how long numba compiles, once it has been imported."""
         if "numba" not in sys.modules or self._compiling:
             return
         from numba.core import event
@@ -77,13 +77,13 @@ class Times:
 
 
 def used() -> float:
-    """Seconds of this process, of those that it waited for and of those that still run below it."""
+    """Processor seconds of this process, of children it waited for and of those still running."""
     spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(each.ru_utime + each.ru_stime for each in spent) + sum(map(running, children(os.getpid())))
 
 
 def children(process: int) -> list[int]:
-    """Processes that a process has started and not waited for; none where /proc does not tell."""
+    """Child processes that a process has not waited for; none without /proc."""
     with contextlib.suppress(OSError):
         return [int(child) for each in Path(f"/proc/{process}/task").iterdir()
                 for child in (each / "children").read_text().split()]  # fmt: skip
@@ -91,7 +91,7 @@ def children(process: int) -> list[int]:
 
 
 def running(process: int) -> float:
-    """Seconds of a process and of all below it."""
+    """Processor seconds of a process and all its descendants."""
     with contextlib.suppress(OSError):
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
         return sum(map(int, fields[11:15])) / TICK + sum(map(running, children(process)))
@@ -99,7 +99,7 @@ def running(process: int) -> float:
 
 
 def command(arguments: Any) -> str:
-    """What a process is counted as: the name of its program, of Python its script or module."""
+    """Kind that a process is counted as: the name of its program, or for Python that of its script or module."""
     words = [arguments] if isinstance(arguments, str | bytes | os.PathLike) else list(arguments)
     names = [os.fsdecode(word).rpartition("/")[2] for word in words]
     if names[0].startswith("python") and len(names) > 1:
@@ -137,7 +137,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Any:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    # A process of pytest-xdist hands its times to the one that prints
+    # A worker of pytest-xdist passes its times to the process that prints
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["cpu"] = session.config.stash[TIMES].tests
 

@@ -1,4 +1,4 @@
-"""Records made for tests, read and written without the package, and plays by brute force."""
+"""Records made for tests, their files read and written without the package, and plays by brute force."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def brute_output(
 
 
 def first_exact(v: Array, largest: float) -> int:
-    """First sample at which plays up to a threshold no longer depend on an unknown start, but for a constant.
+    """First sample from which plays up to a threshold depend on an unknown start only by a constant.
 
-    That is once the drive has swept twice the threshold, or has been at both its own ends.
+    That is once the drive has covered twice the threshold, or has been at both of its extremes.
     """
     low = high = v[0]
     for k, x in enumerate(v):
@@ -49,7 +49,7 @@ def first_exact(v: Array, largest: float) -> int:
 
 
 def error_figures(y: Array, predicted: Array, first: int) -> tuple[float, float, float]:
-    """rms and largest error with a free offset, and rms in % of the peak to peak of what is compared."""
+    """rms and largest error with a free offset, and rms in % of the peak-to-peak output, all from sample `first`."""
     error = (y - predicted)[first:]
     error = error - error.sum() / len(error)
     rms = float(np.sqrt((error**2).sum() / len(error)))
@@ -57,7 +57,7 @@ def error_figures(y: Array, predicted: Array, first: int) -> tuple[float, float,
 
 
 def wander(seed: int, low: float = 0.0, high: float = 100.0, turns: int = 60, samples: int = 40) -> Array:
-    """Straight lines between random places."""
+    """Straight lines between random drives."""
     places = np.random.default_rng(seed).uniform(low, high, turns)
     places[3], places[5] = low, high
     return np.interp(np.arange((turns - 1) * samples + 1) / samples, np.arange(turns), places)

@@ -2,10 +2,10 @@
 
     python tests/static_checks.py
 
-Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
-reason, and on every one listed there that no module shows any more. gcc has to find nothing at all. The files of
-`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of `units.ANALYSED`,
-and by clang-format.
+Emits the modules of MODULES. Fails on every finding of a rule or check that `deviations.yaml` does not list with a
+reason, and on every listed deviation that no module shows any more. gcc must find nothing at all. The source files of
+`c_runtime/` and of effects are checked too: by clang-tidy and gcc in the units of `units.ANALYSED`, and by
+clang-format.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("led", "both", "q31", "corners", "shared-runtime"),
 )
 
-# cppcheck reads no system header; these are what <float.h> says on every target, and the core whose code has most to
-# look at. `unix32` is a 32-bit target: int and long of 32 bits
+# cppcheck reads no system headers: these are the values of <float.h> on every target, and the core with the most code
+# to check. `unix32` is a target with int and long of 32 bits
 CPPCHECK = [
     "--enable=all", "--inconclusive", "--check-level=exhaustive", "--addon=misra", "--std=c99", "--platform=unix32",
     "--quiet", "--suppress=missingIncludeSystem", "--template={file}:{line}: [{id}] {message}",
@@ -78,7 +78,7 @@ GCC = ["-std=c99", "-O2", "-fanalyzer", *C_WARNINGS, "-c", "-o", os.devnull]
 
 @dataclass(frozen=True)
 class Finding:
-    """What a tool says about a line; `rule` is the name in `deviations.yaml`, None where nothing may deviate."""
+    """A tool's message about a line; `rule` is its name in `deviations.yaml`, None if no deviation is allowed."""
 
     tool: str
     rule: str | None
@@ -95,7 +95,7 @@ def emit(folder: Path, name: str, operator: str, arithmetic: str, engine: str, l
 
 
 def find(tool: str) -> str | None:
-    """The tool beside this Python, as its wheel installs it, or on the path."""
+    """Path of a tool: next to this Python, where its wheel puts it, or on PATH; None if not found."""
     return shutil.which(tool, path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
 
 
@@ -104,7 +104,7 @@ def _run(command: Sequence[str | Path]) -> subprocess.CompletedProcess[str]:
 
 
 def cppcheck(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
-    """All files of a module at once, since some rules speak of the whole program."""
+    """Check all files of a module at once, since some rules concern the whole program."""
     done = _run([tool, *CPPCHECK, *sources])
     if done.returncode:
         yield Finding("cppcheck", None, done.stdout + done.stderr)
@@ -119,7 +119,7 @@ def cppcheck(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
 
 
 def clang_tidy(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterator[Finding]:
-    """Each file alone."""
+    """Check each file separately."""
     done = _run([tool, *CLANG_TIDY, *sources, "--", "-std=c99", "-ffreestanding", *more])
     said = [re.search(r" (warning|error): .* \[([\w.,-]+)\]$", line) for line in done.stdout.splitlines()]
     for found in filter(None, said):
@@ -130,7 +130,7 @@ def clang_tidy(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> 
 
 
 def gcc(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterator[Finding]:
-    """Warnings are errors here."""
+    """Compile each file with the analyser; warnings are errors."""
     for source in sources:
         done = _run([tool, *GCC, *more, source])
         if done.returncode:
@@ -144,7 +144,7 @@ EXTENSION = re.compile(
 
 
 def extensions(sources: Sequence[Path]) -> Iterator[Finding]:
-    """Extensions of the language in these files and their headers, MISRA rule 1.2: no tool of those here has it."""
+    """Language extensions in these files and their headers (MISRA rule 1.2, which none of these tools checks)."""
     files = {each for source in sources for each in (source, *source.parent.glob("*.h"))}
     for file in sorted(files):
         for number, line in enumerate(file.read_text(encoding="ascii").splitlines(), 1):
@@ -153,34 +153,34 @@ def extensions(sources: Sequence[Path]) -> Iterator[Finding]:
 
 
 def clang_format(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
-    """Files that are formatted otherwise than the `.clang-format` beside them says."""
+    """Find files that are not formatted as the `.clang-format` beside them says."""
     done = _run([tool, "--dry-run", "--Werror", *sources])
     if done.returncode:
         yield Finding("clang-format", None, done.stderr)
 
 
 LEFT_TO_EMISSION = ("bugprone-suspicious-include", "misc-use-internal-linkage", "misc-unused-parameters")
-"""Checks that the text of a module answers, and a unit of files as they stand cannot."""
+"""Checks that hold only for the text of an emitted module, not for a unit of source files."""
 
 
 def standing(tools: Mapping[str, str], folder: Path, unit: tuple[str, str, str]) -> Iterator[Finding]:
-    """A unit of the run time as it stands; what a model does not call is left out by emission alone."""
+    """Check a unit of source files of the run time, including code that emission would leave out of a model."""
     source = units.write(folder, *unit)
     more = [*units.INCLUDES, *units.FLAGS, *units.DEFINES[unit[1]]]
     yield from gcc(tools["gcc"], [source], more)
     for finding in clang_tidy(tools["clang-tidy"], [source], more):
-        # that files are included is what the unit is for, and calls of the interface are called from others; parameters
-        # that one model has no use for leave with emission
+        # a unit exists to include source files; functions of the interface are called from other files; emission
+        # removes parameters that a model does not use
         if finding.rule not in LEFT_TO_EMISSION:
             yield finding
 
 
 RUN = {"cppcheck": cppcheck, "clang-tidy": clang_tidy, "gcc": gcc}
-"""What looks at a module."""
+"""Tools that check an emitted module."""
 
 
 def problems(findings: Sequence[Finding], listed: Mapping[str, Mapping[str, str]], complete: bool = True) -> list[str]:
-    """Findings that are no listed deviation, one of a rule, and, for a complete run, deviations without a finding."""
+    """Findings that are not listed deviations, one per rule; in a complete run also deviations without a finding."""
     first: dict[tuple[str, str], list[str]] = {}
     for f in findings:
         if f.rule is None or f.rule not in listed.get(f.tool, {}):
@@ -198,14 +198,14 @@ def problems(findings: Sequence[Finding], listed: Mapping[str, Mapping[str, str]
 
 
 def deviations() -> dict[str, dict[str, str]]:
-    """Tool to rule to reason."""
+    """Listed deviations: for each tool, the reason for each rule."""
     listed = YAML(typ="safe").load(DEVIATIONS.read_text(encoding="utf-8"))
     assert all(len(str(reason).split()) > 5 for rules in listed.values() for reason in rules.values())
     return {tool: {str(rule): reason for rule, reason in rules.items()} for tool, rules in listed.items()}
 
 
 def main() -> int:
-    """Exit code: 0 where there is nothing to say."""
+    """Run all checks. Returns the exit code, 0 if there are no problems."""
     tools = {name: path for name in TOOLS if (path := find(name))}
     missing = [name for name in TOOLS if name not in tools]
     if missing:

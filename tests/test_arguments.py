@@ -28,7 +28,7 @@ OF_FILES = "consists of files, not of records in memory"
 
 
 class Frame:
-    """As much of pandas' DataFrame as a call looks at: iterated over, it gives the names of its columns."""
+    """The part of pandas' DataFrame that calls use; iterating over it gives the column names."""
 
     shape = (60, 3)
     columns = ("t", "v", "y")
@@ -46,7 +46,7 @@ class Frame:
         return np.column_stack([T, V, V])
 
 
-# A call, the error it ends in, and what its message says
+# A call, the type of its error, and a pattern of the message
 SIGNALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "two dimensions": (lambda: MODEL.simulate(np.zeros((5, 2))), ValueError, r"v has .*\(N,\), not shape \(5, 2\)"),
     "a column": (lambda: MODEL.simulate(np.zeros((5, 1))), ValueError, r"pass its .ravel\(\)"),
@@ -136,7 +136,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
 
 
 def refused(call: Callable[[], Any], error: type[Exception], words: str) -> None:
-    """One line, of this error, raised by the package itself and not by a library below it."""
+    """Expect a one-line error of this type, raised by the package itself and not by a library below it."""
     with pytest.raises(error, match=words) as caught:
         call()
     assert "\n" not in str(caught.value)
@@ -154,11 +154,11 @@ def test_wrong_arguments(case: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("name", OPTIONS)
 def test_wrong_options_of_a_fit(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of `identify` and of `identify_batch`, before anything is fitted."""
+    """`identify` and `identify_batch` refuse them before anything is fitted."""
     monkeypatch.chdir(tmp_path)
     options, error, words = OPTIONS[name]
     refused(lambda: hystgen.identify(REC, **options), error, words)
-    if not {"columns", "sample_time", "delimiter"} & options.keys():  # of a unit, which fails alone
+    if not {"columns", "sample_time", "delimiter"} & options.keys():  # in a batch these fail one unit only
         refused(lambda: hystgen.identify_batch(REC, "o", **options), error, words)
     assert not list(tmp_path.iterdir())
 
@@ -180,7 +180,7 @@ def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_what_was_right_stays_so() -> None:
-    """Lists, integers, a single number, generators of paths, NumPy's own scalars."""
+    """Lists, integers, single numbers, generators of paths and NumPy scalars are accepted."""
     exact = MODEL.simulate(V)
     for given in (list(V), tuple(V), V.astype(object), V[::-1][::-1]):
         assert np.array_equal(MODEL.simulate(given), exact)

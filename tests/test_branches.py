@@ -1,6 +1,6 @@
 """A drive in front of two branches of the memoryless part comes to rest with its reference.
 
-What the drive moves is the forward model in double precision, which finds the branches by itself from all samples.
+The drive is applied to the forward model in double precision, which finds the branches by itself from all samples.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CREEPING = ("lag_and_creep", "worn")
 
 @cache
 def model(name: str, gap: float) -> Model:
-    """Branches `gap` V apart at the input of the plays."""
+    """A model whose branches are `gap` V apart at the input of the plays."""
     branches = "".join(
         f"    {branch}: {{a0: 6, a1: 0.4, a2: 0.1, a3: {a3}}}\n"
         for branch, a3 in (("ascending", 0.2), ("descending", 0.2 + gap))
@@ -55,7 +55,7 @@ def built(name: str, gap: float, arithmetic: str) -> Compiled:
 
 
 def units(numbers: Compiled) -> tuple[float, float]:
-    """Drive and output units of a number."""
+    """Drive and output unit of one code; 1 in floating point."""
     return (float(numbers.codes.drive_lsb), float(numbers.codes.output_lsb)) if numbers.codes else (1.0, 1.0)
 
 
@@ -79,15 +79,15 @@ def plateaus(u: Array) -> list[slice]:
 
 
 def turns(v: Array, least: float) -> int:
-    """How often the drive changes its direction, in moves larger than `least`."""
+    """How often the drive changes direction, counting only moves larger than `least`."""
     ways = np.diff(v)
     ways = np.sign(ways[np.abs(ways) > least])
     return int(np.count_nonzero(np.diff(ways)))
 
 
 def held(gap: float) -> float:
-    """Most that the sum of the plays misses while a drive holds for half the way to the other branch, by trial: a lag
-    of many samples is half way in the first of a turn."""
+    """Largest error of the play sum while a drive holds for half the distance between the branches, found by trial: a
+    lag of many samples is half way after the first sample of a turn."""
     static = model("lag", gap).cascade
     v = np.linspace(*static.input_range, 2001)
     found = []
@@ -101,7 +101,7 @@ def held(gap: float) -> float:
 @pytest.mark.parametrize("gap", [0.27, 0.01])
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_drive_in_double_precision_comes_to_rest(name: str, gap: float) -> None:
-    """Without creep it stands still; what is left is at most what holding for half a turn misses."""
+    """Without creep it stands still; the residual is at most the error of holding for half a turn."""
     one = model(name, gap)
     u = stops(len(name))
     t = np.arange(len(u)) * T
@@ -116,7 +116,7 @@ def test_a_drive_in_double_precision_comes_to_rest(name: str, gap: float) -> Non
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name not in ("delayed", "ringing")])
 def test_a_drive_of_the_reference_comes_to_rest(name: str, arithmetic: str) -> None:
-    """Only creep moves it, and what is left is no more than is printed, which is not far from what holding misses."""
+    """Only creep moves it; the residual is within the printed bound, which is close to the error of holding."""
     one, numbers = model(name, 0.27), built(name, 0.27, arithmetic)
     drive, output = units(numbers)
     u = stops(10 + len(name))
@@ -133,7 +133,7 @@ def test_a_drive_of_the_reference_comes_to_rest(name: str, arithmetic: str) -> N
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_every_level_is_reached_and_kept(arithmetic: str) -> None:
-    """Steps to levels all over the range and by a few codes, up and down: within what is printed, at rest."""
+    """After steps over the range and by a few codes, up and down, the drive rests and the error is within its bound."""
     one, numbers = model("lag", 0.05), built("lag", 0.05, arithmetic)
     drive, output = units(numbers)
     rng = np.random.default_rng(1)
@@ -150,7 +150,7 @@ def test_every_level_is_reached_and_kept(arithmetic: str) -> None:
 
 
 def test_the_drive_of_a_converter_comes_to_rest() -> None:
-    """Which commits the code that it makes of each answer; `drive_lsb` says how far these lie apart."""
+    """The firmware commits the converter's code for each answer; `drive_lsb` states the spacing of these codes."""
     one, lsb = model("lag", 0.05), 8.0 / 4096
     numbers = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None))
     u = np.repeat(np.random.default_rng(5).uniform(-4.0, 4.0, 8), 100)
@@ -170,8 +170,8 @@ def test_the_drive_of_a_converter_comes_to_rest() -> None:
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["lag", "short_lag", "lag_and_creep", "lag_and_relaxing"])
 def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
-    """While both take the same branch, and have done so for the two samples that a lead depends on: blocks in double
-    precision, which absorb the drives that were sent. One may turn a sample later, within rounding."""
+    """The reference agrees with blocks in double precision that absorb the drives it sent. Samples count only if both
+    have taken the same branch for three samples, on which a lead depends: rounding may delay a turn by a sample."""
     one, numbers = model(name, 0.27), built(name, 0.27, arithmetic)
     drive, output = units(numbers)
     bound = bounds.chain_bounds(numbers, arithmetic).rounding if not numbers.codes else numbers.codes.inverse_rounding
@@ -200,7 +200,7 @@ def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: s
 
 
 def test_a_drive_with_a_limited_rate_does_not_overshoot() -> None:
-    """A brake takes the lead off in time, and leaves the drive on its branch: steps either way, each on its own."""
+    """A brake removes the lead in time and leaves the drive on its branch, for separate steps in both directions."""
     one = model("limited", 0.27)
     for begin, end in ((-3.0, 3.0), (3.0, -3.0), (-1.0, 2.0), (0.0, 0.5)):
         u = np.concatenate([np.full(5, begin), np.full(95, end)])
@@ -212,7 +212,7 @@ def test_a_drive_with_a_limited_rate_does_not_overshoot() -> None:
 
 
 def test_turns_are_no_more_than_the_reference_makes() -> None:
-    """A sine: the drive goes over to the other branch at each turn, once, and is smooth in between."""
+    """On a sine the drive changes to the other branch once per turn and is smooth in between."""
     one = model("lag", 0.27)
     u = 3.0 * np.sin(2.0 * np.pi * np.arange(1600) / 400)
     t = np.arange(len(u)) * T

@@ -1,4 +1,4 @@
-"""The C of models with effects: its bits, what it composes to with the forward model, its bounds, its refusals."""
+"""The C of models with effects: its bits, its composition with the forward model, its bounds and its refusals."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def model(name: str, text: str | None = None) -> Model:
 
 
 def noisy(name: str) -> Model:
-    """A model of which fixed point may make any noise."""
+    """A model that allows any noise gain in fixed point."""
     return with_options(name, noise_gain=1e9)
 
 
@@ -64,7 +64,7 @@ def compiled(one: Model, arithmetic: str) -> tables.Compiled:
 
 
 def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> Run:
-    """A smooth reference with plateaus, over a share of the output range, no faster than what bounds hold for."""
+    """A smooth reference with plateaus, over a share of the output range, at speeds that bounds hold for."""
     rng = np.random.default_rng(seed)
     low, high = (float(end) for end in one.tables.limits.outputs)
     still = rng.random(n) < 0.2
@@ -79,9 +79,9 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
-    """Over short records; long ones are those of `test_mutants.py`, which compiles the reference for them.
+    """Records are short; `test_mutants.py` compiles the reference and runs long ones.
 
-    Each model, in one arithmetic; HYSTGEN_WHOLE=1 runs all four."""
+    Each model runs in one arithmetic, with HYSTGEN_WHOLE=1 in all four."""
     how = {"compiler": ["gcc"], "length": 30 if brief else 200}
     with jit.plain():
         report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", **how)
@@ -100,14 +100,14 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bo
      ("rubbed", "float32"), ("rubbed", "q15")],
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str, core: str) -> None:
-    """Each model on one core, and each core with two models or more; HYSTGEN_WHOLE=1 runs all on all."""
+    """Each model runs on one core, and each core with at least two models; HYSTGEN_WHOLE=1 runs all on all."""
     with jit.plain():
         report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", targets=[core], target_length=150)
     assert report.ok, report.table()
 
 
 AT_REST = {"calm": CALM, "steady": STEADY}
-"""Models whose drive comes to rest in a way of its own."""
+"""Models with special treatment of a drive at rest."""
 
 
 @pytest.mark.parametrize(("name", "arithmetic"), [("calm", "float32"), ("calm", "q15"), ("steady", "q31")])
@@ -132,8 +132,8 @@ def test_cores_give_the_bits_of_a_drive_at_rest(name: str, arithmetic: str) -> N
 LAG = "name: lag, time_constant: 0.01"
 FAST = "name: creep, time_constants: [0.004, 0.015, 0.03], weights: [0.02, 0.03, 0.05]"
 SETTLED = {"q31": 700}
-"""[samples] Ten of the slowest of these time constants, and a hundred; the tail is a lead of less than a code of 2^32
-behind twenty. Others: 400."""
+"""[samples] Time until a drive has settled, 400 if not listed: ten times the slowest of these time constants, and 100.
+In q31 it takes twenty times until the tail of the lead is less than a code of 2^32."""
 QUIETED = {
     "lag": chain("lag", LAG),
     "lag_and_creep": chain("lag_and_creep", LAG, FAST, front=TANH),
@@ -148,8 +148,8 @@ QUIETED = {
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", QUIETED)
 def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
-    """Behind a move down and one up it changes in the direction of creep alone, which turns at most once, and without
-    creep not at all; the displacement, of the model in double precision, stays as near as the drive is kept."""
+    """After a move down and one up only creep moves the drive, in a direction that changes at most once; without creep
+    it stands still. The displacement, by the model in double precision, is as close as the kept drive allows."""
     rng = np.random.default_rng([len(name), len(arithmetic)])
     one = model(name, QUIETED[name] + "emit: {compensation: {quiet: true}}\n")
     numbers = tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
@@ -178,14 +178,14 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
         assert np.count_nonzero(np.diff(way)) <= (name != "lag")
         assert name != "lag" or not len(way)
         assert np.max(error[still]) < allowed
-    if name in ("creep_alone", "short_lag"):  # whose bound does not ask for the same drives
+    if name in ("creep_alone", "short_lag"):  # their bound does not require the same drives
         codes = numbers.codes
         bound = codes.inverse_error * drive if codes else bounds.chain_bounds(numbers, arithmetic).inverse
         assert np.max(np.abs(v * drive - one.inverse().simulate(u * output, t=t, clamp=True))) <= bound
 
 
 def test_a_quiet_drive_moves_when_the_reference_does() -> None:
-    """A code of the reference, and a jump of the offset, while the drive stands still: the lag is led at once."""
+    """If the reference moves by a code or the offset jumps while the drive stands still, the lag is led at once."""
     one = model("lag", QUIETED["lag"] + "emit: {compensation: {quiet: true}}\n")
     numbers = tables.build(one.chain, "q15", T, one.parameters.emit.compensation)
     step, offset = slots.OP_STEP, slots.OP_OFFSET
@@ -203,7 +203,7 @@ def test_a_quiet_drive_moves_when_the_reference_does() -> None:
 
 @pytest.mark.parametrize(("lsb", "changes"), [(8.0 / 4095.0, False), (None, True)])
 def test_a_quiet_drive_knows_the_step_of_a_converter(lsb: float | None, changes: bool) -> None:
-    """In floating point, where the firmware commits what a converter of 12 bits makes of each drive."""
+    """In floating point the firmware commits each drive as rounded by a 12-bit converter."""
     one = model("lag_and_creep", QUIETED["lag_and_creep"] + "emit: {compensation: {quiet: true}}\n")
     t = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None)).tables
     code, state = reference.operations(t, True), reference.new_state(t, True)
@@ -228,8 +228,8 @@ def test_two_branches_are_not_quiet() -> None:
 EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {
     "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
-"""Of the output range. Viscous plays: contacts inside a step. Dashpots: where on its way in a step an input counts as
-standing still, which matters where plays catch up within one."""
+"""[share of the output range] Largest error. For viscous plays it comes from contacts inside a step; for dashpots from
+the place in a step where the input counts as standing still, which matters if plays catch up within the step."""
 
 
 @pytest.mark.slow(one_in=3)
@@ -237,7 +237,7 @@ standing still, which matters where plays catch up within one."""
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:
-    """At every sample that no limit acts on. Each model with one seed; HYSTGEN_WHOLE=1 runs all three."""
+    """Exact at every sample without a limit. Each model runs with one seed, with HYSTGEN_WHOLE=1 with all three."""
     one = model(name)
     numbers = compiled(one, "float64")
     run = record(numbers, seed, share=0.6)
@@ -263,7 +263,7 @@ def test_an_inverse_simulated_twice_begins_at_the_start_memory_both_times(name: 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
-    """A step over half the range, up and down; the model in double precision is what the drive moves."""
+    """A step over half the range, up and down, with the model in double precision as the actuator."""
     lag, slew = "name: lag, time_constant: 0.01", "name: slew_limit, rate: 700, falling_rate: 400"
     one = model("braked", chain("braked", lag, slew))
     numbers = compiled(one, arithmetic)
@@ -288,7 +288,7 @@ SLEWED = chain("slewed", CREEP, "name: slew_limit, rate: 500, falling_rate: 300"
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
 @pytest.mark.parametrize("text", [SLEWED, BRAKED, STEADY, CALM], ids=["slewed", "braked", "steady", "calm"])
 def test_a_held_sample_stays_within_the_slew_limit(text: str, arithmetic: str) -> None:
-    """After a commit and after `settle` the last drive is far away: the answers go there at the amplifier's rate."""
+    """After a commit or `settle` far from the last drive, the answers return to it at the amplifier's rate."""
     one = model("held", text)
     numbers = compiled(one, arithmetic)
     slew = next(effect for effect in one.effects if effect.name == "slew_limit")
@@ -314,7 +314,7 @@ def test_a_held_sample_stays_within_the_slew_limit(text: str, arithmetic: str) -
 
 @pytest.mark.parametrize("name", ["late", "straight", "everything"])
 def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
-    """Jumps and holds, to which a mode rings longest."""
+    """The drive jumps and holds, which makes a mode ring longest."""
     one = model(name, CHAINS[name].replace(BRANCHES, "").replace("rate: 3000", "rate: 30000"))
     low, high = one.cascade.input_range
     v = np.repeat(np.random.default_rng(4).uniform(0.3 * low, 0.3 * high, 4), 60)
@@ -342,7 +342,7 @@ def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
 
 @pytest.mark.parametrize(("frequency", "damping"), [(0.5, 0.3), (30.0, 0.05), (333.0, 1.0), (700.0, 0.01), (5.0, 4.0)])
 def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: float) -> None:
-    """Sizes of responses that bounds are made of, against the recursion sample by sample."""
+    """The sums of absolute responses used in bounds equal those of the recursion sample by sample."""
     effect = Resonance(name="resonance", frequency=frequency, damping=damping)
     one = resonance.numbers(effect, T)
     keep, turn, swing, lead, push = one.table
@@ -350,7 +350,7 @@ def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: 
     n = 40_000
 
     def responses(state: Any, change: float = 0.0) -> tuple[float, float]:
-        """Sums of the sizes of the output and of the rate, with a pulse of the input at the first sample."""
+        """Sums of the absolute output and rate, with a pulse of the input at the first sample."""
         state = np.array(state) + change * np.array([lead, push])
         total, rates = abs(change + state[0]), abs(state[1])
         for k in range(n):
@@ -364,7 +364,7 @@ def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: 
 
 
 def test_drift_is_compensated_ahead_of_time() -> None:
-    """References are ahead of a motion by whole samples, in which the drift goes on."""
+    """References are whole samples ahead of the motion, and the drift goes on meanwhile."""
     text = chain("ahead", "name: drift, rate: -0.08", "name: delay, time: 3.0e-3", CREEP, compensate="drift")
     one = model("ahead", text)
     numbers = compiled(one, "float64")
@@ -416,7 +416,7 @@ def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
 
 
 def test_own_heat_leaves_the_gain_of_one_sample() -> None:
-    """The forward operator has it exactly; the inverse takes the gain before the last move."""
+    """The forward operator computes the heat exactly; the inverse uses the gain before the last move."""
     one = model("heated")
     numbers = compiled(one, "float64")
     run = record(numbers, 5, share=0.6)
@@ -440,7 +440,7 @@ def test_own_heat_leaves_the_gain_of_one_sample() -> None:
 
 
 def test_heat_of_loops_leaves_the_gain_of_one_sample_and_what_few_plays_miss() -> None:
-    """The model has all plays that rub. A drive over the whole range, then small loops in places of their own."""
+    """The model has all rubbing plays. The drive alternates between large loops and small ones at changing places."""
     one = model("rubbed")
     heat = one.effects[0]
     assert isinstance(heat, HysteresisHeating)
@@ -462,7 +462,7 @@ def test_heat_of_loops_leaves_the_gain_of_one_sample_and_what_few_plays_miss() -
 
 
 def test_few_plays_warm_like_many() -> None:
-    """Drives of all kinds, among them the loops that eight plays know least about, against 4000 plays."""
+    """Eight plays against 4000, for drives of all kinds, including the loops that eight plays resolve least."""
     reach, seconds, ends, move = 3.0, T, (-4.0, 4.0), 0.25
     heat = HysteresisHeating(name="thermal", source="hysteresis", time_constant=2.0, heating=0.05, reach=reach)
     allowed = thermal.coarseness(heat, ends, move, seconds)
@@ -509,7 +509,7 @@ def test_ageing_leaves_the_gain_of_one_sample() -> None:
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("seed", [11, 12])
 def test_stays_within_its_bounds(name: str, seed: int) -> None:
-    """float32 against the compensator in double precision, and forward against the chain."""
+    """float32 against double precision: the inverse against the compensator, the forward operator against the chain."""
     one = model(name)
     numbers = compiled(one, "float32")
     bound = bounds.chain_bounds(numbers, "float32")
@@ -530,7 +530,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["led", "wider"])
 def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str, arithmetic: str) -> None:
-    """Smooth ones with plateaus, at speeds of their own; and the error stated is no more than ten times theirs."""
+    """With other smooth references with plateaus, the error is within a factor of ten of the stated one."""
     one = model(name, {**CHAINS, **LED}[name])
     how = one.parameters.emit.compensation
     numbers, ends = compiled(one, arithmetic), one.cascade.input_range
@@ -549,7 +549,7 @@ def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str
 
 @pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> None:
-    """Where only that is promised: float64 to which the drives are committed that float32 sent."""
+    """float32 is within its bound of float64 to which the drives of float32 are committed; no more is promised here."""
     one = model(name, CHAINS[name].replace(BRANCHES, ""))
     numbers, double = compiled(one, "float32"), compiled(one, "float64")
     bound = bounds.chain_bounds(numbers, "float32")
@@ -573,7 +573,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> No
 
 @pytest.mark.thorough
 def test_slow_states_neither_stall_nor_drift() -> None:
-    """tau/T of 2^28: after a step of the drive the state goes where it would go without rounding."""
+    """With tau/T = 2^28 the state after a step of the drive goes where it would go without rounding."""
     seconds, tau = 1e-3, 2.0**28 * 1e-3
     text = chain("slow", f"name: creep, time_constants: [{tau}], weights: [0.1]")
     one = model("slow", text)
@@ -591,7 +591,7 @@ def test_slow_states_neither_stall_nor_drift() -> None:
 
 @pytest.mark.thorough
 def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding() -> None:
-    """In single precision its last moves are 1e-4 of its last bit: the drive stands still for 1e6 samples."""
+    """The drive stands still for 1e6 samples; in single precision the last moves are 1e-4 of the last bit."""
     one = model("dashpot")
     n = 1_000_000
     calls = np.full(n, slots.OP_STEP, dtype=np.uint8)
@@ -609,7 +609,7 @@ def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding()
 @pytest.mark.parametrize("exponent", [0.1, 0.25, 0.5, 0.95, 1.05, 2.0, 4.0, 10.0])
 @pytest.mark.parametrize("tau", [1e-4, 3e-3, 0.2])
 def test_what_a_dashpot_yields_in_a_step(exponent: float, tau: float) -> None:
-    """Against an integrator that does not know the solution; few pieces, which meet and rise."""
+    """The pieces of the solution are few, begin in rising order and agree with a general ODE solver."""
     scale, top = 3.0, 30.0
     effect = RelaxingPlays(name="rate_dependence", shape="relaxation", time_constant=tau, exponent=exponent)
     rows = dashpot.pieces(effect, scale, T, top)
@@ -702,7 +702,7 @@ def test_a_temperature_is_compensated_from_the_next_step_on() -> None:
 
 
 def test_preview_reads_ahead_what_is_late() -> None:
-    """A delay of 2.6 samples and a mode: four samples ahead, weights that sum to 1."""
+    """A delay of 2.6 samples and a mode need references four samples ahead, with weights that sum to 1."""
     numbers = compiled(model("late"), "float64")
     assert numbers.ahead == 4
     assert numbers.taps is not None
@@ -729,7 +729,7 @@ def header(one: Model, macro: str) -> str:
 
 
 def test_noise_gain_is_that_of_an_impulse() -> None:
-    """Without plays everything is linear: the spectrum of the answer to an impulse, over that at rest."""
+    """Without plays all is linear: the gain is the peak spectrum of the impulse response over the gain at rest."""
     one = model("straight")
     numbers = compiled(one, "float64")
     n = 1 << 15
@@ -782,7 +782,7 @@ MODES = [(20.0, 1e-3), (20.0, 0.02), (77.0, 0.1), (150.0, 0.3), (310.0, 0.05), (
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 @pytest.mark.parametrize(("frequency", "damping"), MODES)
 def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: preview.By) -> None:
-    """The mode by scipy, on a drive that is straight between samples: at rest as soon as the last weight has come."""
+    """With a drive that is straight between samples, scipy's mode is at rest once the last weight has acted."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by=by)
     w0 = 2.0 * np.pi * frequency
@@ -801,8 +801,8 @@ def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: previ
 
 @pytest.mark.parametrize(("frequency", "damping"), MODES[:3])
 def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: float) -> None:
-    """Against the recursion with `exp(-w0 T)` twice: the same mean delay but for the part of a sample, no more gain at
-    half the sample rate, and 5 % of a step are left of the poles where the averages have ended."""
+    """Against the recursion with the pole `exp(-w0 T)` twice: the mean delay is longer by at most part of a sample, the
+    gain at half the sample rate is no higher, and when the averages end the poles still miss over 5 % of a step."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by="notch")
     pole = math.exp(-2.0 * math.pi * frequency * T)
@@ -819,7 +819,7 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
 
 @pytest.mark.parametrize(("by", "left"), [("shaper", 0.147), ("notch", 0.135)])
 def test_a_mode_that_is_not_as_identified_rings(by: preview.By, left: float) -> None:
-    """10 % lower: by the share of a step that the docs state, and no more if it is as much higher."""
+    """A mode 10 % too low rings by the share of a step that the docs state, and one 10 % too high by no more."""
     found = preview.taps(0.0, [Resonance(name="resonance", frequency=20.0, damping=0.02)], 1e-4, by=by)
     v = np.concatenate([[0.0], np.cumsum(found.weights[::-1]), np.ones(1500)])
     rings = []
@@ -854,7 +854,7 @@ def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
 
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 def test_what_shapes_says_how_late_it_is(by: str) -> None:
-    """By the motion of the stage on a ramp and on a sine."""
+    """The stated delay and error agree with the motion of the stage on a ramp and on a sine."""
     one = with_options("straight", resonance=by)
     how = one.parameters.emit.compensation
     numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
@@ -907,7 +907,7 @@ def test_a_front_that_may_be_the_sensor_s_is_emitted_with_a_warning(
 
 @pytest.mark.parametrize("name", ["aged", "warm", "late", "drifting", "everything"])
 def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
-    """Each of them, and one that is beyond its limits."""
+    """It calls each setting, and one with a value beyond its limits."""
     one = model(name)
     text = emitted_files(one, operator=operator(name))
     calls = set(re.findall(rf"{name}_inverse_(push|settle|set_\w+)\(", text[f"{name}.h"]))
@@ -916,7 +916,7 @@ def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
     samples = text[f"{name}_selftest.c"].partition("_selftest_inverse[")[2].partition("};")[0]
     counts = Counter(re.findall(r"{'(\w)'", samples))
     assert all(counts[letter] >= 1 for letter in tested)
-    # a setting alone sets the bit, which a later call may be the first to read
+    # only settings set this bit, but a later call may be the first to read it
     assert any(int(status) & slots.LIMITED_SETTING for status in re.findall(r", (\d+)u}", samples))
 
 
@@ -936,7 +936,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """With the engine that is cheaper, then with engine loop."""
+    """Checked with the cheaper engine, then with engine loop."""
     one = noisy(name)
     for engine in dict.fromkeys([one.engine("auto", operator(name), arithmetic), "loop"]):
         memory_is_that_of_the_compiler(one, arithmetic, engine, tmp_path / engine)
@@ -1030,7 +1030,7 @@ def test_simulate_in_an_arithmetic_takes_even_times() -> None:
 
 @pytest.mark.thorough
 def test_a_constant_reference_stays_within_the_bound() -> None:
-    """10^6 samples at rest after a move, the slowest state a third of a second of them."""
+    """10^6 samples at rest after a move; the slowest time constant is a third of that."""
     one = model("creeping")
     numbers, double = compiled(one, "float32"), compiled(one, "float64")
     n = 1_000_000

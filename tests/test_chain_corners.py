@@ -35,14 +35,14 @@ SOME = (
 
 
 def model(text: str) -> Model:
-    """With any noise gain."""
+    """The model of a text, with any noise gain allowed."""
     one = parse_parameters(text, "corners.yaml")
     how = one.emit.compensation.model_copy(update={"noise_gain": 1e9})
     return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
 
 
 def drawn(rng: np.random.Generator) -> str:
-    """A model of a few plays and effects, whose start memory may lie outside its range."""
+    """A random model of a few plays and effects, whose start memory may lie outside its range."""
     n = int(rng.integers(1, 12))
     r = np.cumsum(rng.uniform(0.05, 1.5, n))
     p = [rng.uniform(0.3, 1.0), *rng.uniform(0.02, 0.5, n)]
@@ -64,7 +64,7 @@ def built(one: Model, arithmetic: str, engine: str) -> Compiled:
 
 
 def called(rng: np.random.Generator, one: Compiled, inverse: bool, n: int) -> tuple[Any, Any]:
-    """Calls in any order, most of them steps; codes of a walk, at random, at the ends, and again."""
+    """Random calls, most of them steps; their codes follow a walk, are random, lie at the ends, or repeat."""
     kinds = [slots.OP_STEP] * 30 + [slots.OP_SETTLE, slots.OP_OFFSET, slots.OP_RESET]
     if inverse:
         kinds += [slots.OP_COMMIT] * 6 + [slots.OP_CORRECT, slots.OP_EXPECTED]
@@ -87,7 +87,7 @@ def called(rng: np.random.Generator, one: Compiled, inverse: bool, n: int) -> tu
 
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> None:
-    """Answers and status bits of random models, and of some whose plays' input is refined for a lag."""
+    """Answers and status bits are equal for random models, and for three that refine the plays' input for a lag."""
     led = LED["led"]
     refined = [led, led.replace("0.012]\n", "0.012]\n    initial_state: -9\n", 1), led.replace(": 0.01}", ": 0.05}")]
     rng = np.random.default_rng([36, len(arithmetic), int(arithmetic == "q31")])
@@ -96,7 +96,7 @@ def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> Non
         one = model(refined[k] if k < 3 else drawn(rng))
         try:
             pair = [built(one, arithmetic, engine) for engine in ("loop", "corners")]
-        except FormatError:  # codes too coarse for it
+        except FormatError:  # codes too coarse for this model
             continue
         for inverse in (False, True):
             op, x = called(rng, pair[0], inverse, 250)
@@ -122,7 +122,7 @@ def reference_signal(one: Compiled, seed: int, n: int, share: float) -> Run:
 
 @pytest.mark.parametrize("name", ["creeping", "lagging", "quick", "worn", "led"])
 def test_floating_point_stays_within_its_bounds(name: str) -> None:
-    """Against the compensator in double precision, which shares the verbs of lag and creep with it, and the chain."""
+    """Against the compensator in double precision, which shares the code of lag and creep, and against the chain."""
     one = model({**CHAINS, **LED}[name])
     numbers = built(one, "float32", "corners")
     run = reference_signal(numbers, 3, 250, 0.9)
@@ -133,14 +133,14 @@ def test_floating_point_stays_within_its_bounds(name: str) -> None:
     wanted = Compensator(one.chain).drives(run, ends)
     bound = bounds.chain_bounds(numbers, "float32")
     assert np.max(np.abs(v - wanted)) <= bound.inverse
-    if name not in ("lagging", "led"):  # whose drives may be apart by more than rounding: `bounds.condition`
+    if name not in ("lagging", "led"):  # their drives may differ by more than rounding: `bounds.condition`
         assert np.max(np.abs(v - wanted)) <= bound.rounding
     assert np.max(np.abs(y - one.simulate(v, t=run.t, extra=run.extra))) <= bound.forward
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_in_spite_of_commits_and_holds(seed: int) -> None:
-    """At every other sample, in double precision."""
+    """Exact in double precision at every sample without a commit, a hold or a limit."""
     one = model(chain("kept", "name: creep, time_constants: [0.01, 3], weights: [0.05, 0.1]",
                       "name: saturation, level: 12", front=TANH if seed else ""))  # fmt: skip
     numbers = built(one, "float64", "corners")
@@ -185,7 +185,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
 @pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("arithmetic", ["q31", "float32"])
 def test_a_shared_run_time_keeps_searches_to_itself(arithmetic: str) -> None:
-    """The module carries what it needs of them."""
+    """The shared run time does not export its searches, so the module carries those it needs."""
     one = model(LED["led"])
     how = {"engine": "corners", "layout": "shared-runtime"}
     with jit.plain():
@@ -215,8 +215,8 @@ def test_plays_that_an_effect_moves_or_bends_are_those_of_engine_loop(effect: st
 
 
 def test_auto_is_the_engine_that_costs_less() -> None:
-    """By `FLASH / CYCLES`, with what effects add to the code; for size engine loop, as without effects. In fixed point
-    loop too, whose stack stays within 128 bytes, unless it is asked for speed."""
+    """Cost is `FLASH / CYCLES`, including the code of effects. If asked for size, auto is engine loop, as without
+    effects; in fixed point too, where loop's stack stays within 128 bytes, unless asked for speed."""
     one = model(CHAINS["creeping"])
     assert all(one.engine("auto", "inverse", each) == "corners" for each in ("float32", "float64"))
     assert all(one.engine("auto", "inverse", each) == "loop" for each in ("q31", "q15"))
@@ -225,7 +225,7 @@ def test_auto_is_the_engine_that_costs_less() -> None:
     few = model(CHAINS["creeping"].replace(PLAYS, "\n  pi: {thresholds: [0, 1], weights: [2, 0.5]}\n"))
     assert few.engine("auto", "inverse", "float32") == "corners"
     u = np.linspace(0.0, 3.0, 20)
-    for each in (one, few):  # and what simulates an arithmetic computes as what is emitted
+    for each in (one, few):  # and simulating an arithmetic uses the engine that is emitted
         chosen = each.engine("auto", arithmetic="float32")
         with jit.plain():
             found, same = each.inverse().simulate(u, "float32"), each.inverse().simulate(u, "float32", engine=chosen)

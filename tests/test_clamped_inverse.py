@@ -1,4 +1,4 @@
-"""The inverse in Python keeps the drive range as the C does, with the memory where the actuator is, and says so."""
+"""The inverse in Python limits the drive as the C does, keeps the memory of the limited drive, and warns."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CREEP = f"{PLAIN}  effects: [{{name: creep, time_constants: [{TAU}], weights: [{
 
 
 def plays(v: Array) -> Array:
-    """(1), sample by sample, from a virgin memory."""
+    """Play sum (1), sample by sample, from a virgin memory."""
     s, y = np.zeros(len(R)), []
     for x in v:
         s = np.maximum(x - R, np.minimum(x + R, s))
@@ -40,7 +40,7 @@ def plays(v: Array) -> Array:
 
 
 def crept(v: Array) -> Array:
-    """The plays behind a spring with a damper, which rests at the first sample; scipy holds signals straight too."""
+    """The plays with creep of one spring and damper, at rest at the first sample; scipy too interpolates linearly."""
     h = plays(v)
     late = signal.lsim(([SHARE], [TAU, 1.0]), h - h[0], PERIOD * np.arange(len(h)))[1]
     return np.asarray(h + late + SHARE * h[0] + OFFSET)
@@ -56,13 +56,13 @@ def model(text: str) -> Model:
 
 
 def reference(samples: int = 300) -> Array:
-    """Through the range and far out of it at both ends."""
+    """A reference that covers the range and goes far beyond both ends."""
     turns = np.random.default_rng(5).uniform(-0.4, 1.4, 21) * float(P.sum()) * HIGH
     return np.interp(np.linspace(0.0, 20.0, samples), np.arange(21.0), turns)
 
 
 def told(run: Callable[[], Array]) -> tuple[Array, dict[str, int]]:
-    """Samples, and the numbers that were warned of by the word that says what with."""
+    """The samples of a run, and how many of them warnings report, by what was done to them."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = run()
@@ -95,7 +95,7 @@ def test_the_drive_stays_in_range_and_is_exact_wherever_it_is_not_limited(name: 
 
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_it_limits_as_the_c_does(name: str) -> None:
-    """The bit reference in float64 has the bits of the C."""
+    """It agrees with the bit reference in float64, which has the bits of the C."""
     one = model(ACTUATORS[name][0]).inverse()
     u = reference()
     u[[50, 51, 200]] = np.nan, np.inf, -np.inf
@@ -125,7 +125,7 @@ def test_every_arithmetic_says_what_it_limits(arithmetic: str) -> None:
 
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_nothing_is_said_where_the_ends_are_only_touched(name: str) -> None:
-    """Outputs of drives that go to both ends are in reach, whatever rounding does to them."""
+    """Outputs of drives that go just to both ends can be reached, whatever rounding does to them."""
     text, actuator = ACTUATORS[name]
     v = np.concatenate([[0.0], np.clip(reference() / float(P.sum()), 0.0, HIGH)])
     again, counts = told(lambda: model(text).inverse().simulate(actuator(v)))

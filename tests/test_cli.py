@@ -1,4 +1,4 @@
-"""The command line as a stranger and a CI job meet it: exit codes, what goes where, and nothing half-written."""
+"""The command line as a new user and a CI job see it: exit codes, output streams, and no half-written files."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def hyst(*arguments: object, code: int = 0) -> SimpleNamespace:
     result = CliRunner().invoke(cli.main, [str(a) for a in arguments])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
-    # kernels may have to be compiled first, which is reported
+    # compiling kernels is reported on standard error
     said = "".join(re.findall(r"(?m)^(?!compiling).*\n?", result.stderr))
     out = SimpleNamespace(stdout=result.stdout, stderr=said, lines=result.stdout.splitlines())
     assert result.exit_code == code, f"exit {result.exit_code}\n{out.stdout}\n{out.stderr}"
@@ -101,7 +101,7 @@ def process(
 
 
 def everything(folder: str | Path = ".") -> dict[str, bytes]:
-    """Every file below a folder, hidden ones too, with its bytes; folders with none."""
+    """Path and bytes of every file below a folder, hidden ones too; folders have empty bytes."""
     root = Path(folder)
     return {str(p.relative_to(root)): b"" if p.is_dir() else p.read_bytes() for p in sorted(root.rglob("*"))}
 
@@ -192,7 +192,7 @@ def run_command(text: str, code: int = 0) -> SimpleNamespace:
 
 
 def test_check_of_files_made_with_other_options_advises_no_command_that_replaces_them() -> None:
-    """A q15 module, checked without its options: the first command confirms it, the second is called what it is."""
+    """A q15 module is checked without its options: the first command confirms it, the second is said to replace it."""
     hyst("emit", "stage.yaml", "-o", "fw", "--arithmetic", "q15", "--operator", "both", "--layout", "single-header")
     before = everything()
     said = hyst("emit", "stage.yaml", "-o", "fw", "--check", code=1).stderr
@@ -255,7 +255,7 @@ def test_check_takes_no_word_of_a_file_into_a_command() -> None:
 
 
 def other(name: str, *changes: tuple[str, str]) -> str:
-    """The parameter file of another model, written to the folder."""
+    """Write the parameter file of another model and return its file name."""
     text = STAGE.replace("name: stage", f"name: {name}")
     for old, new in changes:
         text = text.replace(old, new)
@@ -274,7 +274,7 @@ def test_one_command_mends_all_that_is_stale() -> None:
     assert command == "hystgen emit stage.yaml third.yaml -o fw --operator both"
     run_command(command)
     hyst("emit", *files, "-o", "fw", "--operator", "both", "--check")
-    # Of other options, a command for those that share them
+    # For files made with other options, one command for all that share them
     hyst("emit", *files[:2], "-o", "fw", "--arithmetic", "q15")
     said = hyst("emit", *files, "-o", "fw", "--operator", "both", "--check", code=1).stderr
     own, asked = commands(said)
@@ -448,7 +448,7 @@ def test_a_model_without_inverse_can_only_be_emitted_forward() -> None:
 
 
 def bad_files() -> dict[str, bytes]:
-    """Files that are no parameter file, and none of them may make more than a message."""
+    """Files that are not parameter files; each may only cause a message."""
     return {
         "empty.yaml": b"",
         "blank.yaml": b"\n \n# nothing\n",
@@ -529,7 +529,7 @@ def test_what_a_stumble_is_answered_with(words: str, said: str) -> None:
 
 
 def test_files_behind_holdout_and_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A pattern that the shell expands fits the files behind the first; in quotes it is held out whole."""
+    """After --holdout, only the first file of a pattern that the shell expands is held out; in quotes, all are."""
     taken: list[tuple[list[str], list[str]]] = []
 
     def read(sources: Sequence[str], **_: Any) -> None:
@@ -554,7 +554,7 @@ def test_files_behind_holdout_and_patterns(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_messages_reach_the_shell(installed: str) -> None:
-    """Exit codes and streams of the real process."""
+    """Exit codes and output streams of a real process."""
     Path("p0.yaml").write_text(NO_INVERSE)
     done = process("emit", "p0.yaml", "-o", "fw", code=1)
     assert "p_0" in done.stderr
@@ -614,7 +614,7 @@ def test_a_projected_start_memory_is_reported_on_stderr() -> None:
 
 @pytest.fixture
 def installed() -> str:
-    """A compiler of this machine: gcc where there is one."""
+    """Name of a compiler installed on this machine: gcc if there is one."""
     found = compilers.available()
     assert found, "no C compiler"
     return found[0].name
@@ -622,13 +622,13 @@ def installed() -> str:
 
 @pytest.fixture
 def _few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Verification records so short that nothing is compiled for their answers."""
+    """Use verification records so short that the reference is not compiled."""
     monkeypatch.setattr(verification, "verify", partial(verification.verify, length=50))
 
 
 @pytest.fixture
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short verification records."""
+    """Use short verification records."""
     monkeypatch.setattr(verification, "verify", partial(verification.verify, length=LENGTH))
 
 
@@ -636,7 +636,7 @@ LENGTH = 2000
 
 
 def report(path: str = "r.json") -> dict[str, Any]:
-    """A report as any JSON reader takes it: without NaN and Infinity."""
+    """A report read as strict JSON, without NaN and Infinity."""
 
     def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is not JSON")
@@ -713,7 +713,7 @@ def test_a_missing_tool_does_not_hide_a_wrong_bit(installed: str, monkeypatch: p
 
 @pytest.mark.usefixtures("_short")
 def test_several_models_are_verified_in_one_report(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two of them of one name; one of them wrong."""
+    """Two of them have the same name, and one of them is wrong."""
     Path("linear.yaml").write_text(FILES["linear"])
     Path("other").mkdir()
     Path("other/linear.yaml").write_text(FILES["linear"].replace("[2]", "[3]"))
@@ -768,7 +768,7 @@ def test_one_model_that_is_refused_stops_all_before_any_runs() -> None:
 def test_verify_takes_the_forward_operators_that_emit_writes(
     weights: str, effect: str, more: str, installed: str
 ) -> None:
-    """Also of models whose inverse does not exist, or has more noise than is allowed."""
+    """Models without an inverse, or with one that is too noisy, can still emit and verify the forward operator."""
     Path("m.yaml").write_text(
         "hystgen: 1\nname: m\nsample_time: 1.0e-3\ninput_range: [0.0, 100.0]\nmodel:\n"
         f"  pi: {{thresholds: [0, 5, 10], weights: {weights}}}\n  effects:\n    - {{{effect}}}\n{more}"
@@ -779,14 +779,14 @@ def test_verify_takes_the_forward_operators_that_emit_writes(
 
 
 def sabotage(monkeypatch: pytest.MonkeyPatch, operator: str, change: Callable[[np.float32], np.float32]) -> None:
-    """From now on the gain of the last play in the emitted C is another one."""
+    """From now on emit C with a changed gain of the last play."""
     right = module.files
 
     def wrong(*arguments: Any) -> dict[str, str]:
         made = right(*arguments)
         table = re.search(rf"stage_{operator}_segment\[\d+\] = \{{\n(.*\n)+?\}};", made["stage.c"])
         assert table, "no segments"
-        last = r"(\{\S+ \S+ )(\S+)f(, \S+\},\s+\{[^{}]+\}\n\};)"  # but for the one of a play that never follows
+        last = r"(\{\S+ \S+ )(\S+)f(, \S+\},\s+\{[^{}]+\}\n\};)"  # except that of a play that never follows
         found = re.search(last, table[0])
         assert found, table[0]
         changed = found[1] + literal(change(np.float32(found[2]))) + found[3]
@@ -796,7 +796,7 @@ def sabotage(monkeypatch: pytest.MonkeyPatch, operator: str, change: Callable[[n
 
 
 def up(x: np.float32) -> np.float32:
-    """The next number."""
+    """The next larger number."""
     return np.nextafter(x, np.float32(np.inf))
 
 
@@ -813,10 +813,10 @@ def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     assert int(suite.get("failures", 0)) == len(suite.findall(".//failure")) >= 2
     assert "bits equal" not in result.stdout
 
-    # Where the bit reference itself first gives another answer with that number
+    # The first sample at which the bit reference itself answers differently with that number
     model = hystgen.load("stage.yaml")
     numbers, other = (tables.build(model.cascade, "float32", "corners") for _ in range(2))
-    other.inverse.gain[-2] = up(other.inverse.gain[-2])  # the last one is of a play that never follows
+    other.inverse.gain[-2] = up(other.inverse.gain[-2])  # the last one belongs to a play that never follows
     real = np.dtype(np.float32)
     for expected, found in zip(*(run.expected_records(x, real, True, LENGTH) for x in (numbers, other)), strict=True):
         bits = (expected.answer.view(np.uint32) != found.answer.view(np.uint32)) | (expected.status != found.status)
@@ -844,7 +844,7 @@ def test_answers_that_are_no_numbers_fail_and_the_report_is_still_json(
 
 
 class Plays:
-    """The textbook model: play (3) by play, weighted and summed."""
+    """The textbook model: the weighted sum of plays (3)."""
 
     def __init__(self, r: Sequence[float] = R, p: Sequence[float] = P, s: Sequence[float] = M0) -> None:
         self.r, self.p, self.s = r, p, [s[1], *s[1:]]
@@ -860,7 +860,7 @@ class Plays:
         return self.output(self.s)
 
     def drive_for(self, u: float, low: float = LOW, high: float = HIGH) -> float:
-        """The drive in [low, high] that comes nearest to output u: the output rises with the drive."""
+        """The drive in [low, high] whose output is nearest to u, by bisection: the output rises with the drive."""
         a, b = low, high
         for _ in range(80):
             middle = (a + b) / 2
@@ -870,19 +870,19 @@ class Plays:
 
 
 def reachable() -> tuple[float, float]:
-    """Extremes of the output: the straight way to the ends of the range."""
+    """Extremes of the output, reached by going straight from the start to either end of the range."""
     return Plays().see(LOW), Plays().see(HIGH)
 
 
 def write(path: str, columns: dict[str, Iterable[float]], delimiter: str = ",") -> None:
-    """A data file, made with nothing of the package."""
+    """Write a data file without the package."""
     rows = zip(*columns.values(), strict=True)
     lines = [delimiter.join(columns), *(delimiter.join(repr(float(x)) for x in row) for row in rows)]
     Path(path).write_text("\n".join(lines) + "\n")
 
 
 def table(text: str) -> dict[str, list[float]]:
-    """A CSV text as columns; every row is complete and every cell a number."""
+    """Columns of a CSV text, whose rows must be complete and whose cells must be numbers."""
     names, *rows = csv.reader(io.StringIO(text))
     assert len(set(names)) == len(names)
     assert all(len(row) == len(names) for row in rows)
@@ -1037,13 +1037,13 @@ def test_simulate_inverse_reads_u_writes_v_and_counts_what_it_clamps() -> None:
     close(found["v"], [plays.drive_for(min(max(x, low), high)) for x in u], 1e-11)
     assert all(LOW <= x <= HIGH for x in found["v"])
     assert re.search(rf"\b{outside} of {len(u)} references\b", result.stderr), result.stderr
-    # and what comes out is what was asked for
+    # and these drives give the outputs asked for
     plays = Plays()
     close([plays.see(x) for x in found["v"]], [min(max(x, low), high) for x in u], 1e-11)
 
 
 def test_simulate_inverse_counts_the_drives_that_the_range_limits() -> None:
-    """A play that never comes back to its start: outputs near the top can be reached once only."""
+    """One play never returns to its start, so outputs near the top can be reached only once."""
     r, p, s, ends = (0.0, 3.0), (1.0, 0.5), (0.0, 2.5), (-2.0, 2.0)
     Path("once.yaml").write_text(
         f"hystgen: 1\nname: once\ninput_range: {list(ends)}\nmodel:\n"
@@ -1062,7 +1062,7 @@ def test_simulate_inverse_counts_the_drives_that_the_range_limits() -> None:
 
 @pytest.mark.thorough
 def test_simulate_inverse_after_history_takes_the_branch_of_its_own_move() -> None:
-    """Up to 3, down to 2, then a reference a little below: the falling one of two branches that would both do."""
+    """After moves up to 3 and down to 2, a slightly lower reference takes the falling branch, though both would do."""
     shifts = {"ascending": 0.2, "descending": 0.5}
     envelope = "".join(f"    {k}: {{a0: 6, a1: 0.4, a2: 0.1, a3: {a3}}}\n" for k, a3 in shifts.items())
     Path("two.yaml").write_text(STAGE + "  memoryless:\n    kind: tanh\n" + envelope)
@@ -1163,7 +1163,7 @@ def test_show_says_why_there_is_no_inverse() -> None:
 
 
 def test_show_rounds_no_bound_down() -> None:
-    """Nor up by more than a unit of the third digit."""
+    """Bounds are rounded up, by at most a unit of the third digit."""
     for n in range(1, 9):
         Path("dense.yaml").write_text(
             "hystgen: 1\nname: dense\ninput_range: [0, 10]\nmodel:\n  pi:\n"
@@ -1182,7 +1182,7 @@ def test_show_rounds_no_bound_down() -> None:
 
 @pytest.mark.parametrize(("p0", "warned"), [(2e-6, False), (1e-6, True), (1e-9, True)])
 def test_show_warns_of_a_hard_inverse(p0: float, warned: bool) -> None:
-    """The ratio of the slopes (p_0 + 1.812) / p_0 is beyond 1e6 for the second."""
+    """The ratio of the slopes, (p_0 + 1.812) / p_0, exceeds 1e6 from the second case on."""
     Path("stage.yaml").write_text(STAGE.replace("[0.72,", f"[{p0!r},"))
     result = hyst("show", "stage.yaml")
     assert ("slope ratio" in result.stderr) == warned, result.stderr
@@ -1199,7 +1199,7 @@ def test_show_warns_of_a_hard_inverse(p0: float, warned: bool) -> None:
     ],
 )
 def test_show_warns_of_a_wide_error_of_the_inverse(p0: float, arithmetic: str, advice: str) -> None:
-    """Wide is a twentieth of the drive's range, by the figure that is shown: rounding is divided by p_0 at worst."""
+    """A shown error above a twentieth of the drive's range is wide: at worst, rounding is divided by p_0."""
     Path("wide.yaml").write_text(
         "hystgen: 1\nname: wide\ninput_range: [0, 150]\nunits: {input: V, output: um}\nmodel:\n  pi:\n"
         f"    thresholds: [0, 10, 20, 40, 60]\n    weights: [{p0!r}, 0.3, 0.2, 0.1, 0.1]\n"

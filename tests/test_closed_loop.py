@@ -32,7 +32,7 @@ from hystgen.verification import compilers
 
 Array = NDArray[np.float64]
 
-# The note's (38), Examples 1 and 2, and what goes with its Figure 16
+# The note's (38), Examples 1 and 2, and the numbers of its Figure 16
 NUMERATOR, DENOMINATOR = [8.8e16], [1.0, 1.6e4, 6.6e8, 5.3e12, 8.8e16]
 GAINS = PIController(0.185, 185.0)
 R = [0.0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7]
@@ -58,10 +58,10 @@ def signals(response: Response) -> Array:
     return np.array([getattr(response, name) for name in names])
 
 
-# ---------------------------------------------------------------- 50 digits, and what doubles may miss of them
+# ---------------------------------------------------------------- 50 digits, and bounds on the roundings of doubles
 
 U = 2.0**-53
-"""What one rounding of a double changes at most, relatively."""
+"""Largest relative change by one rounding of a double."""
 
 Decimals = NDArray[np.object_]
 Plant = tuple[Decimals, Decimals, Decimals, Decimal]
@@ -89,7 +89,7 @@ def in_decimals(loop: Loop) -> Plant:
 def exponential(
     sample_time: float, numerator: Sequence[float] = NUMERATOR, denominator: Sequence[float] = DENOMINATOR
 ) -> Plant:
-    """A plant of order 4 with a held input, by a power series with 80 digits, in the variables y, y', y'', y'''."""
+    """A plant of order 4 with a held input and states y, y', y'', y''', by a power series with 80 digits."""
     with mpmath.workdps(80):
         a = mpmath.zeros(5)
         for i in range(3):
@@ -104,7 +104,7 @@ def exponential(
 
 
 def moved(plant: Plant, displacement: Decimals) -> Decimals:
-    """Output of a plant at rest for the input that it gets at each sample."""
+    """Output of a plant that starts at rest, for an input given at each sample."""
     a, b, c, d = plant
     x, held, output = decimals(np.zeros(len(b))), Decimal(0), []
     for h in displacement:
@@ -128,7 +128,7 @@ def linear(plant: Plant, gains: PIController, sample_time: float, reference: Arr
 
 
 def accumulated(step: Array, each: Array, count: int) -> Array:
-    """What errors of `each` made at every sample of the recursion x = step x can add up to: sum of |step^k| each."""
+    """Bound on the sum of errors up to `each` in every sample of the recursion x = step x: sum of |step^k| each."""
     total, power = np.zeros(len(each)), np.eye(len(each))
     for _ in range(count):
         total += np.abs(power) @ each
@@ -137,7 +137,7 @@ def accumulated(step: Array, each: Array, count: int) -> Array:
 
 
 def closed(plant: tuple[Array, Array, Array, float], kp: float, g: float) -> Array:
-    """The loop's matrix, in the plant's state, its held input and the integral."""
+    """The closed loop's matrix for the plant's state, its held input and the integral."""
     a, b, c, d = plant
     seen = np.concatenate([c, [d, 0.0]])
     control = -(kp + g) * seen + np.eye(len(seen))[-1]
@@ -147,14 +147,14 @@ def closed(plant: tuple[Array, Array, Array, float], kp: float, g: float) -> Arr
 
 
 def exponential_roundings(a: Array, b: Array) -> tuple[Array, Array]:
-    """What a Pade approximant p(-M)^-1 p(M) of exp M, M = [[A, B], [0, 0]] T of n rows, may miss: the less of two.
+    """Error of a Pade approximant p(-M)^-1 p(M) of exp M, M = [[A, B], [0, 0]] T of n rows: the smaller of two bounds.
 
-    As a whole: at most ten products and solutions, n roundings each, and the squarings, times the condition of the
+    By norm: at most ten products and solutions, n roundings each, and the squarings, times the condition of the
     exponential. By entries, for small M: powers up to 13 of M and a solution take under 20 n roundings, each squaring
     twice as many, and no term is larger than those of exp |M| and exp |M| |exp M|.
     """
     n = len(b) + 1
-    unit = float(np.max(np.abs(b)))  # of the input, which changes no rounding
+    unit = float(np.max(np.abs(b)))  # unit of the input; it changes no rounding
     whole = np.vstack([np.hstack([a, b[:, None] / unit]), np.eye(n)[-1]])
     m = linalg.logm(whole).real
     squarings = max(0, math.ceil(math.log2(np.max(np.sum(np.abs(m), axis=0)))))
@@ -166,13 +166,13 @@ def exponential_roundings(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def balanced(exact: Plant) -> tuple[Array, Array, Array]:
-    """A, B and C in doubles, in states that cost an exponential the least of its digits."""
+    """A, B and C in doubles, with states scaled so that the exponential loses the fewest digits."""
     a, (scale, _) = linalg.matrix_balance(exact[0].astype(float), permute=False, separate=True)
     return a, exact[1].astype(float) / scale, exact[2].astype(float) * scale
 
 
 def is_sampled(loop: Loop, exact: Plant) -> bool:
-    """Whether the first samples after an impulse are those of the exact plant but for roundings of the exponential."""
+    """Whether the first samples after an impulse are the exact plant's, except for roundings of the exponential."""
     a, b, c = balanced(exact)
     impulse = decimals([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     found, expected = moved(in_decimals(loop), impulse), moved(exact, impulse)
@@ -184,7 +184,7 @@ def is_sampled(loop: Loop, exact: Plant) -> bool:
 
 
 def plant_roundings(loop: Loop, displacement: Array) -> tuple[Array, float]:
-    """Of a sample of the plant, its state and its output: as many as terms are added up."""
+    """Bounds on the roundings of the plant's state and output in one sample: one for each term added up."""
     a, b, c, d = loop.sampled_plant
     largest, h = largest_state(a, b, displacement), float(np.max(np.abs(displacement)))
     state = (len(b) + 1) * U * (np.abs(a) @ largest + np.abs(b) * h)
@@ -200,13 +200,13 @@ def largest_state(a: Array, b: Array, displacement: Array) -> Array:
 
 
 def allowed(loop: Loop, gains: PIController, response: Response, disturbance: float = 0.0) -> float:
-    """How far every sample's roundings, and a disturbance of the displacement, can take the output of a linear loop."""
+    """How far roundings and a disturbance of the displacement in every sample can move the output of a linear loop."""
     _, b, c, d = loop.sampled_plant
     kp, g = gains.kp, gains.ki * loop.sample_time
     state, output = plant_roundings(loop, response.displacement)
     e, u = float(np.max(np.abs(response.error))), float(np.max(np.abs(response.control)))
     error = output + U * e
-    integral = g * error + U * (2.0 * g * e + u + kp * e)  # of g, of the product and of the sum
+    integral = g * error + U * (2.0 * g * e + u + kp * e)  # roundings of g, of the product and of the sum
     control = kp * error + integral + U * (kp * e + u) + disturbance
     each = np.concatenate([state + np.abs(b) * control, [control, integral]])
     total = accumulated(closed(loop.sampled_plant, kp, g), each, len(response.t))
@@ -246,7 +246,7 @@ def test_without_hysteresis_the_sampled_loop_is_its_difference_equation() -> Non
 
 
 def test_the_plant_moves_as_the_differential_equation_says() -> None:
-    """Between samples solve_ivp integrates the plant itself; sensor, controller and hold are written out here."""
+    """solve_ivp integrates the plant between samples; sensor, controller and hold are written out here."""
     loop = Loop((NUMERATOR, DENOMINATOR), GAINS, 1e-4)
     response = loop.run(wanted, 0.02)
     rate = 1e4  # states in units of the time in which they change
@@ -264,7 +264,7 @@ def test_the_plant_moves_as_the_differential_equation_says() -> None:
         integral += 185.0 * 1e-4 * e
         held = 0.185 * e + integral
         solved = integrate.solve_ivp(moving, (0, 1e-4), x, "DOP853", args=(held,), rtol=rtol, atol=atol)
-        # of every step the root mean square of the four states' errors is held to the tolerance
+        # in every step the solver keeps the root mean square of the four states' errors within the tolerance
         missed = np.maximum(missed, 2.0 * np.sum(atol + rtol * np.abs(solved.y), axis=1))
         x = solved.y[:, -1]
     a, b, c = (x.astype(float) for x in exponential(1e-4)[:3])
@@ -282,7 +282,7 @@ def test_the_plant_moves_as_the_differential_equation_says() -> None:
 
 @pytest.mark.parametrize("sample_time", [1e-6, 1e-5, 1e-4])
 def test_the_sampled_plant_keeps_its_digits(sample_time: float) -> None:
-    """Unbalanced, the matrix exponential of (38) is off by 5e-8 at 1 us."""
+    """Without balancing, the matrix exponential of (38) would be off by 5e-8 at 1 us."""
     assert is_sampled(Loop((NUMERATOR, DENOMINATOR), GAINS, sample_time), exponential(sample_time))
 
 
@@ -298,7 +298,7 @@ def test_a_plant_with_feedthrough_is_read_before_the_drive_moves() -> None:
 
 
 def test_systems_of_scipy_and_written_out_forms_are_the_same_plant() -> None:
-    """Poles at -1, -2 and -1 +- 1j, of which every form has exact numbers."""
+    """Poles at -1, -2 and -1 +- 1j, for which every form has exact numbers."""
     zpk: tuple[list[float], list[complex], float] = [], [-1.0, -2.0, -1.0 + 1.0j, -1.0 - 1.0j], 4.0
     fraction = [4.0], [1.0, 5.0, 10.0, 10.0, 4.0]
     space = signal.lti(*fraction).to_ss()
@@ -325,7 +325,7 @@ def test_a_discrete_system_is_a_controller() -> None:
 
 @pytest.mark.thorough
 def test_figure_16_is_what_the_model_page_says() -> None:
-    """Second period; the note claims that either inverse is greatly better than none, which does not come out."""
+    """Largest errors of the second period. The note claims that both inverses far surpass none; they do not."""
     cases = {
         "none": (None, 0.102),
         "exact": (STAGE.inverse(), 0.136),
@@ -340,7 +340,7 @@ def test_figure_16_is_what_the_model_page_says() -> None:
 
 @pytest.mark.thorough
 def test_the_uncompensated_loop_rings_where_its_slope_is_beyond_the_stability_limit() -> None:
-    """With a slope m of the actuator, s den + m (kp s + ki) num has its roots on the left up to m = 1.28."""
+    """With an actuator of slope m, the roots of s den + m (kp s + ki) num lie on the left up to m = 1.28."""
 
     def damped(slope: float) -> bool:
         closed = np.polyadd([*DENOMINATOR, 0.0], slope * NUMERATOR[0] * np.array([0.185, 185.0]))
@@ -357,15 +357,15 @@ def test_the_uncompensated_loop_rings_where_its_slope_is_beyond_the_stability_li
 
 
 def within(pi: PI, signal: Array) -> Cascade:
-    """The play sum for what occurs in a loop, of which its roundings are a part."""
+    """The play sum with the range of a signal in the loop, which its bounds depend on."""
     largest = float(np.max(np.abs(signal)))
     return Cascade(pi, input_range=(-largest, largest))
 
 
 def check_linear(loop: Loop, response: Response, stage: Cascade) -> None:
-    """A model behind its inverse passes on what it gets, but for roundings, which the loop answers like any input.
+    """A model behind its inverse passes its input on, except for roundings, to which the loop responds as to any input.
 
-    Of a drive they are bounded as those of a demand, times the sum of |q_i| (37) by which an inverse amplifies.
+    The inverse amplifies by the sum of |q_i| (37), so the bound on its drive is divided by that sum.
     """
     bounds = error_bounds(stage, "float64", "corners")
     gain = (2.0 / stage.pi.weights[0] - 1.0 / stage.pi.slopes[-1]) / stage.front_slopes[0]
@@ -376,9 +376,9 @@ def check_linear(loop: Loop, response: Response, stage: Cascade) -> None:
 
 
 def check_blocks(loop: Loop, response: Response) -> None:
-    """Each signal against the one before it; of the drive, that is left to the test."""
+    """Check each signal against the one before it, except the drive, which is left to the test."""
     np.testing.assert_array_equal(response.error, response.reference - response.output)
-    # control: u = kp e + I, I = I + g e, of which g, two products and two sums are rounded
+    # control: u = kp e + I, I = I + g e; g, two products and two sums are rounded
     kp, g = Decimal(GAINS.kp), Decimal(GAINS.ki) * Decimal(loop.sample_time)
     e, u = decimals(response.error), decimals(response.control)
     before = [decimals(np.concatenate([[0.0], x[:-1]])) for x in (response.error, response.control)]
@@ -390,7 +390,7 @@ def check_blocks(loop: Loop, response: Response) -> None:
     exact = np.array([plays.step(v) for v in decimals(response.drive)], dtype=object)
     bound = error_bounds(within(STAGE, response.drive), "float64", "corners").forward
     assert distance(response.displacement, exact) <= bound
-    # output: the plant, whose roundings fade as it does
+    # output: the plant, whose roundings decay like its state
     state, output = plant_roundings(loop, response.displacement)
     a, _, c, _ = loop.sampled_plant
     bound = np.abs(c) @ accumulated(a, state, len(response.t)) + output
@@ -405,7 +405,7 @@ def check_inverse(response: Response, bound: float, r: list[float] = R, p: list[
 
 @pytest.mark.parametrize("case", ["none", "exact", "approximate", "scale"])
 def test_every_signal_is_that_of_the_loop_written_out(case: str) -> None:
-    """Block by block, because a loop with hysteresis may tear two trajectories apart."""
+    """Checked block by block, because hysteresis in the loop may drive two close trajectories apart."""
     scale, off = 1.0 / 2.05, PI(R_OFF, P_OFF).inverse()
     compensators = {"none": None, "exact": Cascade(STAGE).inverse(), "approximate": off, "scale": scale}
     loop = Loop((NUMERATOR, DENOMINATOR), GAINS, T, STAGE, compensators[case])
@@ -414,7 +414,7 @@ def test_every_signal_is_that_of_the_loop_written_out(case: str) -> None:
     if case == "exact":
         check_inverse(response, error_bounds(within(STAGE, response.drive), "float64", "corners").rounding)
     elif case == "approximate":
-        # its thresholds and weights are numbers of five roundings at most
+        # its thresholds and weights have at most five roundings
         inexact = 5 * U * sum(map(abs, off.weights)) * (np.max(np.abs(response.control)) + off.thresholds[-1])
         forward = error_bounds(within(off, response.control), "float64", "corners").forward
         check_inverse(response, forward + inexact, R_OFF, P_OFF)
@@ -485,7 +485,7 @@ def test_compiled_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_a_coarser_arithmetic_moves_the_drive_by_no_more_than_its_header_states(arithmetic: str) -> None:
-    """The same demand, answered by the C in the loop and by the textbook inverse outside of it."""
+    """The C in the loop and the textbook inverse outside of it answer the same demand."""
     stage = model(NOTE)
     compiled = CompiledC(stage, arithmetic=arithmetic)
     response = Loop((NUMERATOR, DENOMINATOR), GAINS, T, stage, compiled).run(wanted, 1.0)
@@ -495,7 +495,7 @@ def test_a_coarser_arithmetic_moves_the_drive_by_no_more_than_its_header_states(
         for line in header.splitlines()
         if line.startswith("#define NOTE_") and ("MAX_ERROR" in line or "_LSB" in line)
     }
-    # the demand is rounded to a code or float32 first; the inverse's slope is 1/p_0 at most, and it amplifies by 2/p_0
+    # the demand is first rounded to a code or float32; the inverse, of slope 1/p_0 at most, amplifies that by 2/p_0
     if arithmetic == "float32":
         bound, half = stated["NOTE_INVERSE_MAX_ERROR"], float(np.spacing(np.float32(16.0)) / 2)
     else:
@@ -527,7 +527,7 @@ def test_codes_are_the_nearest_and_saturate() -> None:
 
 
 class Bang:
-    """A controller with memory that is nobody's class."""
+    """A user's controller with memory and without a base class."""
 
     def __init__(self) -> None:
         self.resets, self.sum = 0, 0.0
@@ -681,9 +681,9 @@ def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str], monkey
 def test_the_example_of_the_note_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It checks the four cases' errors itself; C in float32 keeps the exact inverse's error."""
+    """The example checks the errors of its four cases itself; C in float32 has the exact inverse's error."""
     example = Path(__file__).parents[1] / "examples" / "note" / "closed_loop.py"
-    monkeypatch.syspath_prepend(str(example.parent))  # as Python does for a file that it is given
+    monkeypatch.syspath_prepend(str(example.parent))  # as Python does when it runs a file
     runpy.run_path(str(example))["make"](tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure_15.svg", "figure_16.svg"]
     lines = {line[2:42].strip(): line.split()[-3:] for line in capsys.readouterr().out.splitlines()}

@@ -65,12 +65,12 @@ EXACT = {
     "without lag": [SLEW, RELAXING, BUMP, LOGARITHMIC, THERMAL, TANH],
 }  # fmt: skip
 BLURRED = {name for name, effects in EXACT.items() if any(each.name in ("lag", "ageing") for each in effects)}
-"""Behind a lag the drive turns by rounding alone where the reference holds, and where the gain depends on the drive
-there may be none at a turn on either branch: with two branches these are not exact at single samples."""
+"""Cases that are not exact at single samples with two branches: behind a lag, rounding alone turns the drive where the
+reference holds, and if the gain depends on the drive, neither branch may have a solution at a turn."""
 
 
 def times(uneven: bool = False) -> Array:
-    """Sample times, even or not."""
+    """Sample times, even or uneven."""
     return np.cumsum(T * np.random.default_rng(4).uniform(0.5, 1.5, N)) if uneven else T * np.arange(N)
 
 
@@ -81,7 +81,7 @@ def smooth(t: Array) -> Array:
 
 
 def both(effects: list[Any], stages: tuple[Any, ...], t: Array, u: Array) -> tuple[Array, Array]:
-    """Drives of the inverse, and what the forward model makes of them."""
+    """Drives of the inverse, and the outputs of the forward model for them."""
     chain = Chain(Cascade(PLAYS, stages, 1.0, (0.0, 100.0)), effects)
     warm = {"temperature": 20.0 + 3.0 * np.sin(5.0 * t)}
     v = Compensator(chain).drives(Run(t, u, warm), WIDE)
@@ -100,8 +100,8 @@ def test_what_is_promised_exactly_comes_out_at_every_sample(name: str, front: st
 
 
 def arrived(v: Array, step: float, lag: float) -> tuple[float, int]:
-    """Overshoot of a lag of `lag` samples on a straight drive, as a share of the step, and samples until 0.1 % of it
-    are left."""
+    """Overshoot of a lag of `lag` samples, as a share of the step, and number of samples until it is within 0.1 %; the
+    drive is straight between samples."""
     numerator, denominator, _ = signal.cont2discrete(([1.0], [lag, 1.0]), 1.0, "foh")
     y = signal.lfilter(np.ravel(numerator), denominator, v)
     left = np.flatnonzero(np.abs(y - step) > 1e-3 * step)
@@ -114,7 +114,8 @@ def arrived(v: Array, step: float, lag: float) -> tuple[float, int]:
     [(20.0, 25.0, 1.0), (20.0, 5.0, 1.0), (2.0, 8.0, 2.0), (100.0, 12.0, 0.5), (60.0, 4.0, 1.0)],
 )
 def test_a_lag_behind_a_slew_limit_does_not_overshoot(lag: float, moves: float, back: float) -> None:
-    """A step of so many moves of the drive; against drives that rise as fast as they can, and then come back so."""
+    """A step of `moves` samples at full rate settles no more than two samples later than the best drive that rises and
+    then returns at full rate."""
     step, rate = 50.0, 50.0 / moves
     slew = effect("slew_limit", rate=rate / T, falling_rate=back * rate / T)
     chain = Chain(Cascade(PI([0.0], [1.0], [0.0]), (), 0.0, (0.0, 100.0)), [effect("lag", time_constant=lag * T), slew])
@@ -131,7 +132,7 @@ def test_a_lag_behind_a_slew_limit_does_not_overshoot(lag: float, moves: float, 
 
 
 def test_only_a_drive_that_a_limit_has_kept_short_is_braked() -> None:
-    """Within its rates the drive is that of a lag alone, whatever the reference asks."""
+    """If the limit is never reached, the drive is that of the lag alone, whatever the reference does."""
     lag = effect("lag", time_constant=20.0 * T)
     t = times()
     u = smooth(t) + np.where(t > 0.3, 0.2, 0.0)
@@ -173,7 +174,7 @@ def _lagged(v: Array, tau: float) -> Array:
 
 
 def test_a_lag_answers_limits_without_a_trace() -> None:
-    """Drives that were limited are what the lag has seen: soon after the last of them nothing is left of it."""
+    """The lag's memory follows the limited drives, so soon after the last of them no error is left."""
     t = times()
     chain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [effect("lag", time_constant=3.0 * T)])
     u = np.where(t < 0.7, 3.0, 6.0)
@@ -246,7 +247,7 @@ emit: {compensation: {%s}}
     ],
 )  # fmt: skip
 def test_the_reference_is_read_as_the_c_reads_it(options: str, model: Callable[[str], hystgen.Model]) -> None:
-    """Double precision against the bit reference of float64, whose rounding a lead of 250 leaves below 1e-11."""
+    """Double precision against the bit reference in float64, whose rounding stays below 1e-11 with a lead of 250."""
     one = model(RUNG % (options if "noise_gain" in options else f"{options}, noise_gain: 10000"))
     rng = np.random.default_rng(0)
     u = np.concatenate([np.full(20, 7.0), 7.0 + np.cumsum(0.02 * rng.normal(size=180))])
@@ -259,7 +260,7 @@ def test_the_reference_is_read_as_the_c_reads_it(options: str, model: Callable[[
 
 @pytest.mark.parametrize("by", ["notch", "shaper"])
 def test_a_step_that_is_shaped_or_notched_leaves_no_ringing(by: str, model: Callable[[str], hystgen.Model]) -> None:
-    """From the first step on, where the plays have only one way to go; it rings by more than half of it otherwise."""
+    """The plays move one way only in the first step, so it does not ring; unshaped it rings by over half the step."""
     mode = f"    - {{name: resonance, frequency: 20, damping: 0.02}}\nemit: {{compensation: {{resonance: {by}}}}}\n"
     one = model(mode)
     u = np.where(np.arange(300) < 20, 1.0, 6.0)
@@ -280,7 +281,7 @@ def test_options_that_count_samples_need_them_at_even_times(model: Callable[[str
 
 
 def test_references_before_a_record_are_its_first(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
-    """What was driven before a record is no reference; a linear stage does not remember it either."""
+    """Drives before a record are not references; a linear stage does not remember them either."""
     shaped = RUNG.replace("    - {name: lag, time_constant: 0.01}\n", "") % "resonance: shaper"
     text = (FILE + shaped).replace("[0, 5, 10, 20], weights: [0.1, 0.02, 0.02, 0.03]", "[0], weights: [0.2]")
     (tmp_path / "stage_x.yaml").write_text(text)
@@ -295,7 +296,7 @@ def test_references_before_a_record_are_its_first(run: Callable[..., tuple[int, 
 
 
 def test_thresholds_that_grow_too_fast_are_stood_in_for() -> None:
-    """Their own inverse would chatter: drives are as smooth as those of the static one."""
+    """Their own inverse would chatter; with the stand-in, drives are about as smooth as those of the static inverse."""
     t = times()
     fast = effect("rate_dependence", betas=(5.0 * T,) * 9)
     v, y = both([fast], (), t, smooth(t))
@@ -324,7 +325,7 @@ def test_what_has_no_inverse_says_why(model: Callable[[str], hystgen.Model]) -> 
 
 
 def test_records_are_one_session(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
-    """Drives of `simulate --operator inverse`, simulated forwards, are the references; limits are counted."""
+    """Drives of `simulate --operator inverse`, simulated forwards, give the references; nothing is limited."""
     (tmp_path / "stage_x.yaml").write_text(FILE + "    - {name: creep, time_constants: [0.2], weights: [0.05]}\n")
     t = T * np.arange(400)
     references = []

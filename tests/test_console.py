@@ -1,4 +1,4 @@
-"""The command line in the places where it is run: full disks, pipes, code pages, signals, read-only machines."""
+"""The command line in real surroundings: full disks, pipes, code pages, signals, read-only machines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FULL = "error: standard output cannot be written: No space left on device; free 
 
 @pytest.fixture(autouse=True)
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every test works in a folder with a model and a record, both with a unit that few code pages have."""
+    """Every test works in a folder with a model and a record, whose unit contains a character few code pages have."""
     monkeypatch.chdir(tmp_path)
     Path("stage.yaml").write_text(STAGE, encoding="utf-8")
     t = np.arange(600) * 1e-3
@@ -47,7 +47,7 @@ def process(*words: str, env: dict[str, str] | None = None, **how: Any) -> subpr
 
 
 def said(done: subprocess.CompletedProcess[bytes]) -> str:
-    """Its standard error without words on compiling, which a first run has."""
+    """Standard error of a process without the messages on compiling that a first run prints."""
     return "".join(re.findall(r"(?m)^(?!compiling).*\n", done.stderr.decode()))
 
 
@@ -97,7 +97,7 @@ def test_talk_that_cannot_be_written_changes_no_result(words: Sequence[str], cod
     assert Path("new.yaml").exists() == (code == 0)
 
 
-PAGES = ("cp932", "koi8-r", "cp437", "cp1252", "ascii", "utf-8")  # two of a kind: without µ, with it, of UTF-8
+PAGES = ("cp932", "koi8-r", "cp437", "cp1252", "ascii", "utf-8")  # two each without µ, with µ, and written as UTF-8
 
 
 @pytest.mark.slow(one_in=2)
@@ -108,7 +108,7 @@ def test_any_code_page_takes_every_result(page: str) -> None:
     assert "µm" in plain
     shown = process("show", "stage.yaml", env={"PYTHONIOENCODING": page})
     assert (shown.returncode, said(shown)) == (0, "")
-    # click writes UTF-8 where a terminal claims to know ASCII alone
+    # click writes UTF-8 if a terminal claims to be ASCII
     expected = plain.encode("utf-8" if page == "ascii" else page, "backslashreplace")
     assert shown.stdout == expected
     done = process("identify", "record.csv", "-o", "new.yaml", "--plot", "fit.svg", env={"PYTHONIOENCODING": page})
@@ -129,7 +129,7 @@ def test_data_on_standard_output_are_utf_8_in_any_code_page(page: str) -> None:
 
 @pytest.mark.thorough
 def test_files_are_utf_8_in_any_locale(tmp_path: Path) -> None:
-    """Text that is read or written without an encoding would be in the locale's: Python warns of that when asked."""
+    """Files opened without an encoding would use the locale's; Python is told to warn of that."""
     strict = {"PYTHONWARNDEFAULTENCODING": "1", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     code = (
         "import sys, warnings\n"
@@ -168,7 +168,7 @@ def litter(*folders: Path) -> list[Path]:
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 @pytest.mark.thorough
 def test_a_process_that_is_ended_leaves_nothing(words: Sequence[str], sign: str, sent: signal.Signals) -> None:
-    """SIGTERM and SIGHUP at once; kill -9 can only be cleared up behind by the next run."""
+    """SIGTERM and SIGHUP clean up at once; after kill -9 only the next run can."""
     Path("units").mkdir()
     for k in range(12):
         Path(f"units/u{k}.csv").write_bytes(Path("record.csv").read_bytes())
@@ -188,7 +188,7 @@ def test_a_process_that_is_ended_leaves_nothing(words: Sequence[str], sign: str,
         assert started.returncode == -signal.SIGKILL
         assert litter(temporary)
         deadline = time.monotonic() + 30.0
-        while workers(temporary) and time.monotonic() < deadline:  # which end when they find themselves alone
+        while workers(temporary) and time.monotonic() < deadline:  # workers end when their parent is gone
             time.sleep(0.1)
         assert subprocess.run(
             [sys.executable, "-m", "hystgen", "verify", "stage.yaml", "--compiler", "gcc"], env=env, capture_output=True
@@ -199,7 +199,7 @@ def test_a_process_that_is_ended_leaves_nothing(words: Sequence[str], sign: str,
 
 
 def workers(temporary: Path) -> list[str]:
-    """Processes whose temporary files go there."""
+    """Processes whose folder for temporary files is this one."""
     found = []
     for entry in Path("/proc").glob("[0-9]*/environ"):
         try:
@@ -232,12 +232,12 @@ def test_handlers_are_put_back(run: Any) -> None:
 
 
 def doubled(x: float) -> float:
-    """Something to compile."""
+    """A function to compile."""
     return x + x
 
 
 def compiled_once() -> tuple[float, list[str]]:
-    """What `doubled` gives as a fresh process compiles or loads it, and the words on that."""
+    """Result of `doubled`, compiled or loaded as in a fresh process, and the messages about that."""
     words: list[str] = []
     jit._listen()
     jit.announce = words.append
@@ -248,7 +248,7 @@ def compiled_once() -> tuple[float, list[str]]:
 
 
 def test_no_cache_of_compiled_code_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a container: neither the installation nor the home folder can be written to."""
+    """As in some containers, neither the installation nor the home folder is writable."""
     from numba.core import caching
 
     def refused(_: object) -> None:
@@ -298,7 +298,7 @@ def test_a_backend_from_a_notebook_is_no_matter(backend: str) -> None:
 
 
 def test_the_users_own_plots_keep_their_backend() -> None:
-    """A notebook that calls hystgen before it imports matplotlib itself."""
+    """A notebook may call hystgen before it imports matplotlib itself."""
     code = (
         "import os\nfrom hystgen.basics import drawing\ndrawing.require()\nimport matplotlib\n"
         "print(matplotlib.get_backend(), os.environ['MPLBACKEND'])"
@@ -318,7 +318,7 @@ def test_a_home_folder_that_cannot_be_written_to_makes_no_noise() -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("home", ["/dev/null/home", "/proc/none"])
 def test_zig_builds_without_a_home_folder(home: str) -> None:
-    """For one that cannot be made under /proc zig would wait for ever."""
+    """zig would wait for ever for a home folder that cannot be created under /proc."""
     env = {"HOME": home, "XDG_CACHE_HOME": f"{home}/cache"}
     done = process("verify", "stage.yaml", "--compiler", "zig", env=env)
     assert done.returncode == 0, done.stdout.decode()

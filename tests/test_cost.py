@@ -1,4 +1,4 @@
-"""The operations that the banner promises, counted in the bit reference, which runs in Python on numbers that count."""
+"""The operations that the banner promises, counted by running the bit reference in Python on counting numbers."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ SAMPLES = 600
 INDICES = {
     "shift", "first", "pieces", "ascending", "below", "scale", "counts", "top", "rose", "stage_first", "stage_size",
 }  # fmt: skip
-"""Arrays of places and numbers of bits, whose comparisons are no operations on numbers of the model."""
+"""Arrays of indices and bit counts; comparing them is not an operation on the model's numbers."""
 
 
 class Number:
-    """A number that counts what is done with it."""
+    """A number that counts its multiplications and comparisons."""
 
     products = comparisons = 0
 
@@ -96,11 +96,11 @@ for each in ("lt", "le", "gt", "ge", "eq", "ne"):
 
 
 PLACES = {"bool", "uint8_t", "uint_least8_t", "uint_least16_t"}
-"""Types of members that are flags, places or numbers of bits."""
+"""Types of members that are flags, indices or bit counts."""
 
 
 def counting_layout(kind: type[Struct]) -> np.dtype[np.void]:
-    """The structured type in which a structure's numbers count."""
+    """Structured type of a structure with counting numbers."""
     fields: list[Any] = []
     for name, (word, length) in kind.members().items():
         if isinstance(word, type):
@@ -112,7 +112,7 @@ def counting_layout(kind: type[Struct]) -> np.dtype[np.void]:
 
 
 def count_in(out: Struct, x: Struct) -> Struct:
-    """Fill a structure whose numbers count with those of another one."""
+    """Copy a structure into one with counting numbers."""
     for name, (word, _) in type(x).members().items():
         if isinstance(word, type):
             count_in(getattr(out, name), getattr(x, name))
@@ -123,7 +123,7 @@ def count_in(out: Struct, x: Struct) -> Struct:
 
 
 def counting(x: Any, name: str = "") -> Any:
-    """Tables or memory in which every number counts."""
+    """Tables or memory with counting numbers."""
     if isinstance(x, Struct):
         return count_in(np.zeros(x.shape, counting_layout(type(x))).view(type(x)), x)
     if isinstance(x, np.ndarray) and name not in INDICES and (x.dtype.kind == "f" or x.dtype == np.int64):
@@ -145,12 +145,12 @@ def model(front: str, n: int, more: str = "") -> Model:
 
 @pytest.fixture(autouse=True)
 def _as_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Functions run as they stand in their modules, where a test may have put others in place of those they call."""
+    """Interpret functions as they stand in their modules, so that tests can replace the functions they call."""
     monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))
 
 
 def dearest(one: Model, name: str, engine: str, inverse: bool, samples: int = SAMPLES) -> tuple[int, int]:
-    """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
+    """Most multiplications and comparisons of a step, for jumps of all sizes, also beyond the limits, with commits."""
     tables = one.tables(name, engine)
     code, counted = reference.operations(tables, inverse), counting(tables)
     state = counting(reference.new_state(tables, inverse))
@@ -186,7 +186,7 @@ LAG = GAIN.replace("thermal, gain_per_degree: 0.001", "lag, time_constant: 0.01"
 def test_nor_does_one_of_engine_corners_with_an_effect(
     name: str, front: str, effect: str, n: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The effect's own multiplications are printed apart from those of the plays; a lag needs a finer solution."""
+    """The banner prints an effect's multiplications apart from those of the plays; a lag needs a finer solution."""
     for kernel, of in (("tanh", math.tanh), ("atanh", math.atanh)):
         monkeypatch.setattr(envelopes, kernel, lambda x, _, of=of: Number(of(float(x))))
     one = model(front, n, effect)
@@ -228,8 +228,8 @@ PLAY_EFFECTS = {
 @pytest.mark.parametrize("name", ["float64", "q31"])
 @pytest.mark.parametrize("effect", EFFECTS | PLAY_EFFECTS)
 def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Comparisons are printed of the plays alone, which one that bends or moves them has too. No jump takes a search as
-    many tries as there may be; slopes that lead nowhere do."""
+    """Comparisons are printed only for plays, also for plays that an effect bends or moves. No jump makes a search use
+    all its tries, so its steps are set to 0 here."""
     reciprocal = moving_float.inverse
     monkeypatch.setattr(moving_float, "inverse", lambda t, slope: reciprocal(t, slope) * 0)
     monkeypatch.setattr(moving_fixed, "quotient", lambda x, y: fixed.quotient(x, y) * 0)
@@ -258,7 +258,7 @@ def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monk
 def test_no_step_takes_more_than_the_banner_says_nor_far_less(
     name: str, engine: str, front: str, operation: str, n: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Kernels of tanh and atanh aside; more than half of what is promised is met by jumps at random."""
+    """Random jumps take at least half of the promised operations; kernels of tanh and atanh are not counted."""
     for kernel, of in (("tanh", math.tanh), ("atanh", math.atanh)):
         monkeypatch.setattr(envelopes, kernel, lambda x, _, of=of: Number(of(float(x))))
     one = model(front, n)

@@ -25,7 +25,7 @@ from hystgen.plays.density import DensityError, Discretisation, from_formula, fr
 pytestmark = pytest.mark.thorough
 
 Curve = Callable[[float], float]
-U = 2.0**-53  # what one rounding may add, as a share of its result
+U = 2.0**-53  # largest relative error of one rounding
 
 
 def loading_curve(plays: Discretisation, x: np.ndarray) -> np.ndarray:
@@ -294,7 +294,7 @@ def test_thresholds_that_coincide() -> None:
 
 
 def test_the_same_on_every_machine() -> None:
-    """Rounded once from 40 digits: these are the correctly rounded values."""
+    """Values are rounded only once, from 40 digits, so they are the correctly rounded ones."""
     plays = from_formula(parse_formula("0.8*exp(-0.3*r)"), 10.0).discretise(0.7, 12)
     with mpmath.workdps(60):
         a, b = mpmath.mpf("0.8"), mpmath.mpf("0.3")
@@ -337,7 +337,7 @@ SLOW = {
     "fast oscillations": "+".join(f"1+sin({k}*r)" for k in range(900, 968)),
     "digits": "0." + "3" * 990 + "*r",
 }
-"""The slowest formulas of the permitted length that we found, of each kind; before work was bounded, up to 20 min."""
+"""The slowest formulas of each kind found within the permitted length; without a limit they took up to 20 min."""
 
 
 @pytest.mark.slow(one_in=2)
@@ -347,7 +347,7 @@ def test_no_formula_computes_for_long(label: str) -> None:
     start = time.process_time()
     with contextlib.suppress(DensityError):
         from_formula(parse_formula(SLOW[label]), 10.0)
-    assert time.process_time() - start < 25.0  # 5 s on a machine that has nothing else to do
+    assert time.process_time() - start < 25.0  # 5 s on an idle machine
 
 
 def test_a_formula_that_takes_too_long_says_so() -> None:
@@ -360,7 +360,7 @@ def test_a_formula_that_takes_too_long_says_so() -> None:
 
 @pytest.mark.parametrize("n", [16, 4096])
 def test_the_most_that_fits_into_a_formula_is_taken(n: int) -> None:
-    """A sum of 29 bell curves, each of which the integral is known."""
+    """A sum of 29 bell curves, whose integrals are known."""
     curves = [(i, i / 3.1, 0.3) for i in range(1, 30)]
     text = "+".join(f"{a}*exp(-((r-{b:.4f})/{c})**2)" for a, b, c in curves)
     start = time.process_time()
@@ -390,7 +390,7 @@ def test_large_powers_are_those_of_another_precision(base: str, exponent: str) -
         )
         expected = mpmath.power(a, b)
         found = parse_formula(f"{base}**({exponent})")(1.0)
-        # 40 digits of the base make a relative error of the exponent times that
+        # the base has 40 digits, and the power multiplies its relative error by the exponent
         allowed = (abs(b) * mpmath.mpf(10) ** -39 + mpmath.mpf(10) ** -36) * abs(expected)
         assert abs(mpmath.mpf(found) - expected) <= allowed
 
@@ -450,7 +450,7 @@ heights = st.lists(st.floats(0.0, 3.0), min_size=7, max_size=7).filter(lambda p:
 
 
 def continuous_output(r: list[float], p: list[float], p0: float, v: list[float], start: float) -> float:
-    """(18) after the drives v: between its kinks the play is straight in r, so that Simpson's rule is exact."""
+    """(18) after the drives v. Between its kinks the play is straight in r, so Simpson's rule is exact."""
     turns = [start, *v]
     kinks = {abs(a - b) / 2 for a in v for b in turns} | {abs(a - start) for a in v} | set(r)
     places = np.array(sorted(x for x in kinks if r[0] <= x <= r[-1]))
@@ -472,7 +472,7 @@ def discrete_output(plays: Discretisation, v: list[float], start: float) -> floa
 
 
 def output_rounding(plays: Discretisation, r: list[float], p: list[float], v: list[float]) -> float:
-    """Of both: they add up a term for every play and every place between kinks, with 20 roundings in a term."""
+    """Roundings of both outputs: each adds a term per play or place between kinks, with at most 20 roundings a term."""
     places = len(v) * (len(v) + 3) // 2 + len(r)
     return (len(plays.weights) + places + 20) * U * r[-1] * (0.7 + max(p) * r[-1])
 
@@ -501,7 +501,7 @@ def test_output_of_any_history(
 @settings(max_examples=50)
 @given(knots, heights, st.integers(1, 12))
 def test_some_history_reaches_the_bound_of_the_output(gaps: list[float], p: list[float], n: int) -> None:
-    """It turns at every threshold and every boundary of a cell, the outermost first."""
+    """The history turns at every threshold and every boundary of a cell, from the outermost inwards."""
     r = np.cumsum([0.0, *gaps]).tolist()
     p = p[: len(r)]
     plays = from_table(r, p).discretise(0.7, n)
@@ -517,13 +517,13 @@ def test_some_history_reaches_the_bound_of_the_output(gaps: list[float], p: list
 @settings(max_examples=60)
 @given(st.lists(st.floats(0.0, 2.0), min_size=3, max_size=3), st.floats(0.1, 3.0), st.floats(0.5, 20.0), st.integers(1, 20))
 def test_random_formulas_against_the_exact_loading_curve(c: list[float], b: float, end: float, n: int) -> None:
-    """`a0 + a1 exp(-b r) + a2 r**2`, integrated twice by hand."""
+    """The density `a0 + a1 exp(-b r) + a2 r**2` is integrated twice by hand."""
     text = f"{c[0]!r} + {c[1]!r}*exp(-{b!r}*r) + {c[2]!r}*r**2"
     plays = from_formula(parse_formula(text), end).discretise(0.7, n)
     x = np.unique(np.concatenate([np.linspace(0, end, 400), plays.thresholds]))
     exact = 0.7 * x + c[0] * x**2 / 2 + c[1] * (x / b + np.expm1(-b * x) / b**2) + c[2] * x**4 / 12
     gap = exact - loading_curve(plays, x)
-    # 12 roundings of a term and n additions, and what cancels in the exponential's part
+    # 12 roundings of a term, n additions, and cancellation in the exponential's part
     rounding = U * ((n + 12) * exact.max() + 8 * c[1] * (end / b + 1 / b**2))
     assert gap.min() >= -rounding
     assert gap.max() <= plays.error + rounding

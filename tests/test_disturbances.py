@@ -1,4 +1,4 @@
-"""Faults and disturbances of records made here, found by kind, place and count; records without any stay silent."""
+"""Faults and disturbances of made records are found by kind, place and count; records without any report nothing."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def noise(n: int, seed: int, colour: float = 0.0) -> Array:
 
 
 def plant(v: Array) -> Array:
-    """The plays by brute force, after the history."""
+    """Output of the plays by brute force, after the history."""
     whole = brute_output(np.concatenate([HISTORY, v]), THRESHOLDS, WEIGHTS, 0.0)
     return np.asarray(whole[len(HISTORY) :])
 
@@ -83,7 +83,7 @@ def errors(items: Sequence[Item]) -> list[Array]:
 
 
 def of_kind(kind: type[Kind], findings: Sequence[Finding], record: str) -> Kind:
-    """The finding of one kind and record."""
+    """The only finding of one kind for a record."""
     (found,) = [each for each in findings if isinstance(each, kind) and getattr(each, "record", None) == record]
     return found
 
@@ -92,7 +92,7 @@ class TestSilence:
     @pytest.mark.parametrize("colour", [0.0, 0.7, 0.95])
     @pytest.mark.parametrize("grain", [0.0, 0.002, 0.02])
     def test_effect_free_records(self, colour: float, grain: float) -> None:
-        """White and coloured noise, fine and coarse converters."""
+        """Records with white or coloured noise and fine or coarse converters report nothing."""
         items = session(colour)
         if grain:
             items = [changed(item, grain * np.round(item.y / grain)) for item in items]
@@ -104,7 +104,7 @@ class TestSilence:
         assert disturbances.stick_slip(items, errors(items), NOISE) == []
 
     def test_without_noise(self) -> None:
-        """Holds of a simulation are equal samples, and no fault."""
+        """Equal samples in the holds of a simulation are not a fault."""
         items = [changed(item, plant(item.run.v)) for item in session()]
         assert preparing.without_faults(items, [])[1] == []
 
@@ -137,7 +137,7 @@ class TestWrongSamples:
 
     @pytest.mark.parametrize("period", [7.0, 8.4, 12.0, 20.0])
     def test_ringing_is_no_drop_out(self, period: float) -> None:
-        """Behind steps with long rests half a swing leaves and comes back too, in several steps."""
+        """After steps with long rests half a swing leaves and comes back as well, but in several steps."""
         angle, decay = 2.0 * np.pi / period, np.exp(-0.03 * 2.0 * np.pi / period)
         down = [1.0, -2.0 * decay * np.cos(angle), decay**2]
         v = np.repeat([0.0, 80.0, 20.0, 100.0, 40.0], 4000)
@@ -210,7 +210,7 @@ class TestPeriodic:
         assert np.std(np.concatenate(left)) == pytest.approx(NOISE, rel=0.1)
 
     def test_a_ripple_is_told_by_what_moves(self) -> None:
-        """Of a long record of holds a fit has left nothing of it."""
+        """A long record of holds, in which a fit leaves no ripple, does not hide it in the records that move."""
         moving = [changed(item, item.y + 0.05 * np.sin(2 * np.pi * plant(item.run.v) / 0.4)) for item in session(0.5)]
         v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 5000)
         still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
@@ -231,7 +231,7 @@ class TestPeriodic:
         assert "interpolation error" in ripple.sentence("um")
 
     def test_what_is_another_on_the_way_back_is_no_ripple(self) -> None:
-        """Triangles over the same range, so that what turns with the way is the same in all of them."""
+        """The triangles cover the same range, so an error that changes sign with the direction is the same in all."""
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         made = {}
         for ways in ("both", "turned"):
@@ -248,7 +248,7 @@ class TestPeriodic:
 
     @pytest.mark.parametrize("damping", [0.004, 0.015, 0.03])
     def test_what_rings_and_fades_in_a_long_record_is_no_line_but_is_heard(self, damping: float) -> None:
-        """Steps every five seconds for forty: the more it is damped, the more bins of a spectrum its peak is broad."""
+        """Steps come every 5 s for 40 s: the stronger the damping, the more bins of the spectrum the peak covers."""
         t = np.asarray(np.arange(20_000) * 2e-3, dtype=np.float64)
         v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 2500)
         since, omega = t % 5.0, 2 * np.pi * 47.0
@@ -272,7 +272,7 @@ class TestPeriodic:
 
     @pytest.mark.parametrize(("frequency", "seen"), [(10.6, False), (13.0, True), (50.0, True)])
     def test_harmonics_of_a_drive_that_swells_are_no_lines(self, frequency: float, seen: bool) -> None:
-        """It never repeats itself."""
+        """The drive never repeats itself, but its harmonics are recognised."""
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         v = 50.0 - np.linspace(10.0, 50.0, len(t)) * np.cos(2 * np.pi * 5.3 * t)
         assert signals.repetition(v) is None
@@ -283,7 +283,7 @@ class TestPeriodic:
 
 
 def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
-    """A follower that stands until it is behind by about a distance, then catches up at once."""
+    """An output that stands until it is behind by about `distance`, then catches up at once; and the jumps' samples."""
     random = np.random.default_rng(seed)
     out, at, place, limit = np.empty_like(y), [], float(y[0]), distance
     for k, x in enumerate(y.tolist()):
@@ -297,10 +297,10 @@ def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
 @pytest.mark.parametrize(
     ("items", "one", "speed"),
     [
-        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True, True),  # what leads to the first end is none
-        ([sweep(120, 0, 100, 0, 100), sweep(0, 97, 4, 97, 4, seconds=1.2)], True, True),  # about the same, as fast
+        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True, True),  # the way to the first end is left out
+        ([sweep(120, 0, 100, 0, 100), sweep(0, 97, 4, 97, 4, seconds=1.2)], True, True),  # nearly the same loop
         ([sweep(0, 100, 0, 100), sweep(0, 100, 0)], True, True),
-        ([sweep(0, 100, 0, 100, 50, 100, 0)], False, True),  # a loop inside
+        ([sweep(0, 100, 0, 100, 50, 100, 0)], False, True),  # an inner loop
         ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 80, 0)], False, True),  # another size
         ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=3)], True, False),  # another speed
         ([sweep(0, 100)], False, True),  # no loop
@@ -344,7 +344,7 @@ def records() -> list[Record]:
 def check(
     given: Sequence[Record], weights: Sequence[float] | Array = WEIGHTS
 ) -> tuple[list[Record | None], list[Finding]]:
-    """Against a nominal model that is 20 % off."""
+    """Check records against a nominal model that is 20 % off."""
     model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
     return preparing.checked(given, lambda record: hypothesis.predicted(record, *model, HISTORY))
 
@@ -361,7 +361,7 @@ class TestWholeRecords:
 
     @pytest.mark.parametrize("factor", [1000.0, 0.001])
     def test_a_drive_in_another_unit(self, factor: float) -> None:
-        """It is not a measure of how wide the others are."""
+        """The other drives are not judged narrow by it."""
         given = records()
         given[1] = replace(given[1], v=factor * np.asarray(given[1].v))
         kept, (each,) = check(given)
@@ -404,7 +404,7 @@ class TestWholeRecords:
     def test_exchanged_columns_of_any_gain_and_loop(
         self, weights: tuple[float, ...], gain: float, which: set[int]
     ) -> None:
-        """In other units a prediction has hardly a loop, and of a wide loop it has another shape."""
+        """In other units the prediction has hardly a loop, and a wide loop has another shape."""
         nominal_weights = gain * np.array(weights)
         given = []
         for k, record in enumerate(records()):
@@ -417,7 +417,7 @@ class TestWholeRecords:
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
 
     def test_exchanged_columns_without_a_loop(self) -> None:
-        """Less of a move than the least threshold: the sensitivity tells."""
+        """The records move by less than the smallest threshold, so only the sensitivity tells."""
         small = [replace(r, v=50.0 + 0.01 * r.v, y=3.0 + 8e-4 * r.v + 0.01 * noise(len(r.v), 8)) for r in records()]
         assert check(small)[1] == []
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k == 3 else r for k, r in enumerate(small)]
@@ -488,7 +488,7 @@ class TestIntervals:
     TRUE = 0.012
 
     def fitted(self, seed: int) -> tuple[float, list[float]]:
-        """A lag before the plays, exact for drives that are straight between samples."""
+        """Fitted time constant and its interval for a lag before the plays; the drives are straight between samples."""
         items = []
         for k, v in enumerate(drives()[:3]):
             s = STEP / self.TRUE
@@ -521,7 +521,7 @@ class TestIntervals:
         assert np.mean(widths) < 3.0 * 3.92 * np.std(values)
 
     def test_are_the_same_for_any_singular_vectors(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Their signs are a matter of the library's and of the last bit."""
+        """The signs of singular vectors depend on the library and on the last bit."""
         _, expected = self.fitted(0)
         svd = np.linalg.svd
 
@@ -536,7 +536,7 @@ class TestIntervals:
 
 
 def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
-    """Drop-outs do not spoil the fit, hum is reported and nothing is named, and the page says so."""
+    """Drop-outs do not spoil the fit; hum is reported, no effect is named, and the page says so."""
     given, hum = records(), records()
     for k, record in enumerate(hum):
         hum[k] = replace(record, y=np.asarray(record.y) + 0.06 * np.sin(2 * np.pi * 50.0 * record.t))
@@ -575,8 +575,8 @@ def _late(v: Array, samples: float) -> Array:
 @pytest.mark.thorough
 @pytest.mark.parametrize("lagging", [False, True])
 def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> None:
-    """So large that the output turns round, and beside a lag only seen once that is found: neither an effect nor
-    stick-slip. A few per cent of it are in the weights."""
+    """A ripple so large that the output reverses is neither an effect nor stick-slip; beside a lag it is seen once the
+    lag is found. The weights absorb a few per cent of it."""
     made = []
     for k, v in enumerate(drives()):
         t = np.asarray(100.0 * k + np.arange(len(v)) * STEP, dtype=np.float64)
@@ -601,7 +601,7 @@ def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> No
 @pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("frequency", [50.0, 180.0])
 def test_hum_hides_nothing(tmp_path: Path, frequency: float) -> None:
-    """A drift of 2.5 times the noise beside hum of 14 times as much."""
+    """A drift of 2.5 times the noise is found beside hum of 14 times the noise."""
     made = []
     for k, v in enumerate(drives()):
         t = np.asarray(10.0 * k + np.arange(len(v)) * STEP, dtype=np.float64)

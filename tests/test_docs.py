@@ -1,12 +1,13 @@
 """The documentation: every command and code block runs, every link leads somewhere, every page fits a phone.
 
 A page is a test: its blocks run from top to bottom in a folder with the examples, a recording, a held-out one and the
-model `stage_x` of them. What a fence's language means:
+model `stage_x` identified from them. The language of a fence means:
 
-- `sh`, `console`: commands; behind `$` the exact output, `...` for any text
-- `python`: one name space a page; what is printed stands behind the call as a comment
-- `c`: compiles against the emitted `stage_x`
-- `yaml`, `text`: becomes the file that the sentence before it names; a parameter file, or a part of one, loads
+- `sh`: commands that succeed
+- `console`: commands after `$`, with their exact output; `...` stands for any text
+- `python`: code in one namespace per page; a comment behind a print gives its output
+- `c`: code that compiles against the emitted `stage_x`
+- `yaml`, `text`: the file that the sentence before it names; `yaml` is all or part of a parameter file that loads
 """
 
 from __future__ import annotations
@@ -46,26 +47,26 @@ PAGES = {path.relative_to(ROOT).as_posix(): path for path in [README, *sorted(DO
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 CALLS = 2000
-"""Calls of a record of `verify` here, for the 100000 that users get; other tests run those."""
+"""Calls per record of `verify` here instead of the default 100000, which other tests run."""
 
 BARE = {"docs/tutorials/two-minutes.md", "docs/tutorials/first-recording.md"}
-"""Pages that make the model themselves."""
+"""Pages that create the model themselves."""
 
 STEP = 5.0e-4
 """[s] Sample time of the shipped recordings."""
 
 TARGET_CALLS = 100
-"""The same on emulated cores, where a page gives none."""
+"""Calls per record on emulated cores, if the page gives no number."""
 
 SHORTER = {"python examples/compensate_plants.py -o docs": " --plant 'Dahl friction in a positioner'"}
-"""Commands that take minutes, and what makes them do a part here."""
+"""Commands that take minutes, and the option that limits each to a part of its work here."""
 
 ELSEWHERE = {
     "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
     "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
         "test_session.py::test_the_command_of_the_plan_cuts_the_recording",
 }  # fmt: skip
-"""Commands that take too long here, and the tests that do what they do."""
+"""Commands that take too long here, and the tests that run the same."""
 
 
 # Blocks --------------------------------------------------------------------------------------------
@@ -73,7 +74,7 @@ ELSEWHERE = {
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: `words` before it, the last paragraph."""
+    """A fenced block; `words` is the paragraph before it."""
 
     language: str
     text: str
@@ -82,13 +83,13 @@ class Block:
 
     @property
     def saved_as(self) -> str | None:
-        """The file that the sentence before it names."""
+        """Name of the file that the sentence before the block asks to save, or None."""
         found = re.search(r"[Ss]ave\s+(?:this|that|it)\s+as\s+`([^`]+)`[^`]*$", self.words)
         return found[1] if found else None
 
 
 def blocks(text: str) -> list[Block]:
-    """The fenced blocks of a page but its directives."""
+    """The fenced blocks of a page, without directives."""
     found = []
     for match in re.finditer(r"^```(\{?[\w-]*\}?).*\n((?:.*\n)*?)```$", text, re.MULTILINE):
         if not match[1].startswith("{"):
@@ -104,7 +105,7 @@ def commands(text: str) -> list[str]:
 
 @dataclass
 class Page:
-    """A page being run: where, what its Python knows, the last exit code."""
+    """A page being run: its folder, the names its Python has defined, and the last exit code."""
 
     folder: Path
     names: dict[str, Any]
@@ -117,11 +118,11 @@ class Page:
         getattr(self, block.language)(block)
 
     def text(self, block: Block) -> None:
-        """A file."""
+        """Check that a text is saved as a file."""
         assert block.saved_as, "a block of text that is not a file"
 
     def yaml(self, block: Block) -> None:
-        """A parameter file, or part of one."""
+        """Load a parameter file, or the model with part of one."""
         part = YAML(typ="safe", pure=True).load(block.text)
         if part is None:  # comments for an editor
             return
@@ -133,13 +134,13 @@ class Page:
         hystgen.load(self.folder / "page.yaml")
 
     def c(self, block: Block) -> None:
-        """A C file that compiles beside the emitted module."""
+        """Compile a C file beside the emitted module."""
         (self.folder / "page.c").write_text(block.text)
         flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", "firmware", "-c", "-o", os.devnull]
         subprocess.run(["cc", *flags, "page.c"], cwd=self.folder, check=True)
 
     def python(self, block: Block) -> None:
-        """Code whose prints stand behind them as comments."""
+        """Run code and compare its output with the comments behind its prints."""
         ast.parse(block.text)
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
@@ -147,13 +148,13 @@ class Page:
         assert out.getvalue().splitlines() == re.findall(r"^ *print\(.*\)  # (.*)$", block.text, re.MULTILINE)
 
     def sh(self, block: Block) -> None:
-        """Commands that succeed."""
+        """Run commands that must succeed."""
         for command in commands(block.text):
             printed = self.command(command)
             assert self.code == 0, f"{command}\n{printed}"
 
     def console(self, block: Block) -> None:
-        """Commands with what they print."""
+        """Run commands and compare what they print."""
         for part in re.split(r"^\$ ", re.sub(r"\\\n\s*", " ", block.text), flags=re.MULTILINE)[1:]:
             command, _, shown = part.partition("\n")
             printed = str(self.code) + "\n" if command == "echo $?" else self.command(command)
@@ -164,7 +165,7 @@ class Page:
             assert re.fullmatch(form, printed), f"$ {command}\n{printed}"
 
     def command(self, command: str) -> str:
-        """Run one command; what it prints, on both channels in order."""
+        """Run one command. Returns what it prints on both streams, in order."""
         words = shlex.split(re.sub(r"\s+# .*", "", command))
         if " ".join(words) in ELSEWHERE:
             self.code = 0
@@ -186,7 +187,7 @@ class Page:
         return str(done.stdout)
 
     def own(self, command: str) -> str:
-        """The command line, in this process; patterns become files where they are not in quotes, as in a shell."""
+        """Run the command line in this process; patterns without quotes are expanded as in a shell."""
         arguments = []
         for word in shlex.split(re.sub(r"\s+# .*", "", command), posix=False)[1:]:
             (plain,) = shlex.split(word)
@@ -205,14 +206,14 @@ class Page:
 
 
 def merged(whole: Any, part: Any) -> Any:
-    """A mapping with the entries of another in it."""
+    """A mapping with the entries of another merged into it."""
     if not (isinstance(whole, dict) and isinstance(part, dict)):
         return part
     return {**whole, **{key: merged(whole.get(key), value) for key, value in part.items()}}
 
 
 def installs(requirements: list[str]) -> bool:
-    """Whether they are this project with extras that it has."""
+    """Whether all requirements are this project, with extras that it has."""
     for requirement in (word for word in requirements if word != "-e"):
         found = re.fullmatch(r"(?:\.|hystgen)(?:\[([\w,]+)\])?", requirement)
         if found is None or not set((found[1] or "all").split(",")) <= PROJECT["optional-dependencies"].keys():
@@ -221,13 +222,13 @@ def installs(requirements: list[str]) -> bool:
 
 
 def bounded(verify: Any, *given: Any, target_length: int | None = None, **options: Any) -> Any:
-    """A verification over short records, for which it would take longer to compile the reference."""
+    """Verify over records so short that compiling the reference would take longer than running it in Python."""
     with jit.plain():
         return verify(*given, length=CALLS, target_length=target_length or TARGET_CALLS, **options)
 
 
 def add_droop(folder: Path) -> None:
-    """A model with a sample time, and a recording with the effect `user:droop`, by its equation alone."""
+    """Give the model a sample time, and add a recording with the effect `user:droop` made from its equation alone."""
     known = folder / "stage_x.yaml"
     known.write_text(f"sample_time: {STEP}\n{known.read_text()}")
     static = hystgen.load(known)
@@ -244,7 +245,7 @@ def add_droop(folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder that pages begin with."""
+    """The folder that every page starts from."""
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("__pycache__", "out"))
     (folder / "diagnosis").mkdir()
@@ -263,7 +264,7 @@ LONG = {
     "docs/effects.md", "docs/tutorials/name-what-is-missing.md", "docs/howto/diagnose.md", "docs/howto/python.md",
     "docs/plants.md",
 }  # fmt: skip
-"""Pages that take as long as three others; `make test` has others of their kind."""
+"""Pages that take as long as three others; `make test` runs others of their kind."""
 
 
 @pytest.mark.parametrize(
@@ -347,7 +348,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def broken(*pages: Path) -> list[str]:
-    """Links of pages, or of all in a folder, that lead to no file or no place in one; other sites are not tried."""
+    """Links of pages, or of all pages in a folder, to a missing file or anchor; links to other sites are not tried."""
     lychee = Path(sys.executable).parent / "lychee"
     command = [lychee, "--offline", "--no-progress", "--include-fragments=anchor-only", "--format", "json", *pages]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -364,7 +365,7 @@ def test_links_of_the_site_lead_somewhere(site: Path) -> None:
 
 
 def test_links_of_the_pages_lead_somewhere_without_the_site() -> None:
-    """As one reads them in the repository."""
+    """The links also work when the pages are read in the repository."""
     assert broken(*ROOT.glob("*.md"), *DOCS.rglob("*.md")) == []
 
 
@@ -387,7 +388,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
 
 @pytest.mark.thorough
 def test_the_references_are_of_the_program(site: Path) -> None:
-    """A sample of each page that is generated."""
+    """Each generated page contains some names of the program."""
     for page, words in {
         "command-line": ("--allow-partial", "--target-length", "hystgen schema"),
         "parameter-file": ("input_range", "drive_lsb", "noise_gain", "initial_state"),
@@ -405,7 +406,7 @@ def test_the_references_are_of_the_program(site: Path) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("width", [390, 1280])
 def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, chromium: str, tmp_path: Path) -> None:
-    """In a browser: nothing sticks out, every picture is drawn, nothing is complained of."""
+    """In a browser no page is wider than its window, every picture is drawn, and the console shows no error."""
     pages = sorted(path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md"))
     (tmp_path / "frames.html").write_text(
         f"""<!DOCTYPE html><body><pre></pre><script>

@@ -41,7 +41,7 @@ CASCADE = Cascade(PI(THRESHOLDS.tolist(), WEIGHTS.tolist()), (), 0.3, (-4.0, 4.0
 
 
 def make(name: str, **keys: Any) -> Effect:
-    """An effect as a parameter file gives it."""
+    """An effect built from its keys in a parameter file."""
     shapes = effects.shapes(name)
     selector = shapes[0].selector
     known = {shape.model_fields[selector].annotation.__args__[0]: shape for shape in shapes} if selector in keys else {}  # type: ignore[union-attr]
@@ -88,7 +88,7 @@ each = pytest.mark.parametrize("effect", EVERY, ids=label)
 
 
 def drive(n: int = 2000, seed: int = 0) -> tuple[Array, Array]:
-    """A smooth random drive on even times over one second."""
+    """A smooth random drive at even times over one second."""
     rng = np.random.default_rng(seed)
     t = np.arange(n) / n
     parts = [rng.normal() * np.sin(2 * np.pi * (f * t + rng.uniform())) for f in (1, 2.3, 5.1, 11.7)]
@@ -103,10 +103,10 @@ def uneven(n: int = 1500, seed: int = 1) -> tuple[Array, Array]:
 
 
 def rounding(steps: int, size: float) -> float:
-    """Bound on the rounding of a linear filter that remembers a number of steps, of numbers up to `size`.
+    """Bound on the roundings of a linear filter that remembers this number of steps, for numbers up to `size`.
 
     A step rounds its states and the output 12 times at most, each time by half the spacing of numbers at `size`, and a
-    stable filter does not enlarge an error that it has (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
+    stable filter does not amplify earlier errors (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
     section 3.1).
     """
     return 12 * steps * 0.5 * float(np.finfo(float).eps) * size
@@ -120,7 +120,7 @@ def of(effect: Effect, t: Array, v: Array) -> Array:
     return Chain(CASCADE, [effect]).simulate([record(t, v)])[0]
 
 
-# What every effect has to keep ----------------------------------------------------------------------------
+# What holds for every effect ------------------------------------------------------------------------------
 
 
 def test_the_catalogue_is_complete() -> None:
@@ -199,23 +199,23 @@ def test_a_record_in_pieces_is_the_record(effect: Effect) -> None:
 
 @each
 def test_finer_samples_give_the_same(effect: Effect) -> None:
-    """Random time steps against a fine even grid that contains them."""
+    """Samples at random times give the same as a fine even grid that contains them."""
     rng = np.random.default_rng(4)
     fine, dense = drive(120_001)
     kept = np.unique(np.concatenate([[0, len(fine) - 1], rng.integers(0, len(fine), 30_000)]))
     here, there = of(effect, fine[kept], dense[kept]), of(effect, fine, dense)[kept]
-    first_order = isinstance(effect, type(EVERY[2]))  # in the step: a rate taken from the sample before
+    first_order = isinstance(effect, type(EVERY[2]))  # in the step: the rate is that of the sample before
     assert np.max(np.abs(here - there)) < (5e-3 if first_order else 3e-4) * np.ptp(there)
 
 
 STRAIGHT = [e for e in EVERY if e.name in ("slew_limit", "lag", "creep", "resonance")]
 STRAIGHT = [e for e in STRAIGHT if label(e) != "slew_limit-sudden"]
-"""Effects to which the drive is straight between samples, wherever these are."""
+"""Effects that take the drive as straight between samples at any times."""
 
 
 @pytest.mark.parametrize("effect", STRAIGHT, ids=label)
 def test_filters_are_exact_between_corners(effect: Effect) -> None:
-    """On a broken line samples between its corners change nothing, whatever the steps."""
+    """On a broken line, further samples between its corners change nothing."""
     rng = np.random.default_rng(4)
     t, v = uneven(400)
     fine = np.sort(np.concatenate([t, rng.uniform(0, t[-1], 5000)]))
@@ -231,7 +231,7 @@ def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
     run = record(t, h)
     rows = np.stack([h, other, 2.0 * h - 3.0 * other, h**2, other**2, h * other])
     found = effect.filtered(rows, run)
-    # Resonances fade within 120 steps; a creep remembers all 1500, in states that are rounded 5 times and count for 0.2
+    # Resonances fade within 120 steps; creep remembers all 1500, but in states that round 5 times and add only 0.2
     size = float(np.max(2.0 * np.abs(found[0]) + 3.0 * np.abs(found[1]) + np.abs(found[2])))
     assert np.max(np.abs(found[2] - (2.0 * found[0] - 3.0 * found[1]))) < rounding(150, size)
     for alone, beside in zip(rows, found, strict=True):
@@ -272,7 +272,7 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
 
 @pytest.mark.parametrize("session", [0.05, 0.15, 8.0, 1e6])
 def test_a_start_from_a_simpler_shape_lies_within_bounds(session: float) -> None:
-    """However short the session, and wherever the search for the simpler shape has ended."""
+    """This holds for sessions of any length, and wherever the search for the simpler shape has ended."""
     columns = frozenset({"temperature"})
     about = About(
         (-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), columns, output=(-5.0, 3.0)
@@ -290,7 +290,7 @@ def test_a_start_from_a_simpler_shape_lies_within_bounds(session: float) -> None
 
 
 def test_what_no_record_shows_ringing_is_no_resonance() -> None:
-    """Less than three samples per period, or no peak: in the records that is a delay or a lag."""
+    """With less than three samples per period, or without a peak, records only show a delay or a lag."""
     about = About((0.0, 1.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,), ringing=(200.0, 450.0))
     for candidate in effects.shapes("resonance")[0].candidates(about):
         fastest = candidate.build(candidate.high)
@@ -302,7 +302,7 @@ def test_what_no_record_shows_ringing_is_no_resonance() -> None:
 @pytest.mark.parametrize(("slope", "end"), [(-1.0, 0.0), (1.0, 1.0)])
 @pytest.mark.parametrize("rounding", [-1e-13, 0.0, 1e-13])
 def test_an_even_density_has_its_bump_at_the_higher_end(slope: float, end: float, rounding: float) -> None:
-    """Above its middle at one end by as much as below it at the other: which is taken is not left to rounding."""
+    """The density is as far above its middle at one end as below it at the other; rounding does not decide the end."""
     about = About((0.0, 90.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0, 10.0))
     (candidate,) = effects.shapes("noncongruent")[1].candidates(about)
     assert candidate.grown is not None
@@ -433,7 +433,7 @@ def test_delay_shifts_a_band_limited_signal() -> None:
 
 
 def test_slew_limit_against_a_loop() -> None:
-    """In steps so short that it hardly matters where in one of them the drive is met."""
+    """The loop's steps are so short that it hardly matters where in a step the limited drive meets the drive."""
     t, v = uneven(300)
     up, down, parts = 12.0, 7.0, 2000
     a, expected, longest = v[0], [v[0]], 0.0
@@ -452,14 +452,14 @@ def test_slew_limit_against_a_loop() -> None:
 
 
 def converted(fine: Array, per: int) -> Array:
-    """What a converter that averages over each of its samples, `per` fine ones long, makes of them."""
+    """Samples of a converter that averages over each sample, which is `per` fine steps long."""
     return np.asarray(fine.reshape(-1, per).mean(axis=1))
 
 
 @pytest.mark.parametrize("where", [0.0, 0.2, 0.5, 0.7])
 def test_sudden_edges_against_a_generator_that_steps(where: float) -> None:
-    """Anywhere in a sample, up and down; a limit that follows slowly arrives when it should, and a straight edge makes
-    it early by up to a sample. The means over samples with an edge or a corner of the limited drive are right too."""
+    """Edges go up and down, anywhere in a sample. The limited drive arrives on time, where taking an edge as straight
+    makes it early by up to a sample. Means over samples with an edge or a corner of the limited drive are right too."""
     per, rate, samples = 400, 7.0, 60
     fine = np.repeat([0.0, 1.0], (samples // 3 * per + round(where * per), 2 * samples // 3 * per - round(where * per)))
     fine -= np.where(np.arange(len(fine)) >= 40 * per + round(where * per), 0.6, 0.0)
@@ -473,17 +473,17 @@ def test_sudden_edges_against_a_generator_that_steps(where: float) -> None:
         shape: np.abs(make("slew_limit", shape=shape, rate=rate).drive(v, Run(t, v)) - expected)
         for shape in ("sudden", "straight")
     }
-    assert np.max(off["sudden"]) < 4.0 * most  # the loop begins within one of its steps, and the mean within two
+    assert np.max(off["sudden"]) < 4.0 * most  # the loop starts within one of its steps, the mean within two
     assert np.max(off["straight"][~beside]) > 0.4 * rate / samples
 
 
 @pytest.mark.parametrize("edge", [0.0, 0.3, 1.0])
 def test_edges_are_where_a_converter_takes_its_commands(edge: float) -> None:
-    """Commands, and outputs at their times; the converter takes each one a part of a sample after the one before."""
+    """The converter takes each command at a share `edge` of the step before it; outputs are those at the samples."""
     per, rate, samples = 1000, 7.0, 60
     t = np.arange(samples) / samples
     v = np.repeat([0.0, 1.0, 0.4], samples // 3)
-    at = np.arange((samples - 1) * per + 1) / per  # in samples; a command is there from its time on
+    at = np.arange((samples - 1) * per + 1) / per  # in samples; command k acts from k - 1 + edge on
     fine = v[np.minimum(np.ceil(at - edge), samples - 1).astype(int).clip(0)]
     most = rate / samples / per
     a, expected = 0.0, []
@@ -496,7 +496,7 @@ def test_edges_are_where_a_converter_takes_its_commands(edge: float) -> None:
 
 
 def test_sudden_edges_leave_other_drives_alone() -> None:
-    """Ramps, sines, corners, one sample aside, and edges that last three samples are straight between samples."""
+    """Ramps, sines, corners, a single outlier and edges over three samples count as straight between samples."""
     t = np.arange(200.0)
     corners = np.interp(t, [0, 20, 50, 120, 199], [0.0, 1.0, -1.0, 2.0, 2.0])
     for v in (t, np.sin(0.9 * t), corners, np.where(t == 90, 1.0, 0.0), np.clip((t - 60.0) / 3.0, 0.0, 1.0)):
@@ -544,7 +544,7 @@ def test_logarithmic_creep_is_straight_over_log_t() -> None:
 def test_creep_forgets_its_start_as_its_transients_do() -> None:
     effect = make("creep", time_constants=(0.05, 0.4), weights=(0.3, 0.2))
     t, h = drive()
-    longer = np.concatenate([[5.0 - h[0]], h])  # one earlier sample, another start
+    longer = np.concatenate([[5.0 - h[0]], h])  # an earlier sample with another start
     before = np.concatenate([[-0.3], t])
     difference = effect.filtered(longer, Run(before, longer))[1:] - effect.filtered(h, Run(t, h))
     rows = effect.transients(Run(t, h))
@@ -569,7 +569,7 @@ def test_resonance_against_scipy(frequency: float, damping: float) -> None:
 
 @pytest.mark.parametrize("share", [0.01, 0.4, 0.99])
 def test_a_part_of_a_resonance_against_scipy(share: float) -> None:
-    """As one transfer function, with zeros where the mode and the rest are opposite."""
+    """The mode and the rest as one transfer function, with zeros where they cancel."""
     t, h = drive()
     w, damping = 2 * np.pi * 30.0, 0.02
     poles = np.array([1.0, 2 * damping * w, w * w])
@@ -640,7 +640,7 @@ def test_relaxing_plays_against_the_ode(tau: float, exponent: float, tolerance: 
         return np.asarray(np.sign(gap) * scale / tau * (beyond / scale) ** exponent)
 
     expected = [z]
-    for k in range(25):  # Runge-Kutta of order 4, contacts are not located but steps are short
+    for k in range(25):  # Runge-Kutta of order 4; contacts are not located, but steps are short
         h = (t[k + 1] - t[k]) / pieces
         for part in range(pieces):
             x, y = (w[k] + (w[k + 1] - w[k]) * (part + shift) / pieces for shift in (0.0, 1.0))
@@ -657,7 +657,7 @@ def test_relaxing_plays_against_the_ode(tau: float, exponent: float, tolerance: 
 
 @pytest.mark.parametrize("part", range(6))
 def test_any_relaxation_against_an_ode_solver(part: int) -> None:
-    """Slow to stiff ones over straight steps, fast ones among them, by a method that knows nothing of play."""
+    """Slow to stiff relaxations over straight moves, some of them fast, against a solver that is not told of plays."""
     from scipy.integrate import solve_ivp
 
     rng = np.random.default_rng(part)
@@ -702,8 +702,8 @@ def test_relaxing_plays_that_threads_share_are_those_computed_one_by_one(monkeyp
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 3.0])
 def test_a_relaxation_over_moves_of_some_roundings(exponent: float) -> None:
-    """A play that lets go of a hair's stretch may catch up where hardly anything is left of the move: nothing moves
-    then, and no state is further away than its threshold and what it was before."""
+    """A play that releases a tiny stretch may catch up when hardly anything is left of the move. Then nothing moves,
+    and its distance from the input exceeds neither its threshold nor what it was before."""
     r, tau = 0.375662, 0.0006880369858470095
     moves = [(-8.45397949219, -8.453979492189998, -8.078317492189814)]
     rng = np.random.default_rng(4)
@@ -744,7 +744,7 @@ def test_play_functions_against_sums() -> None:
 
 
 def test_loop_centre_against_a_sum_of_relays() -> None:
-    """A play is half the sum of relays over all centres; their density is what the parameters say."""
+    """A play is half the sum of relays over all centres; the parameters give the density of the relays."""
     amplitude, centre, width = 0.6, 0.4, 0.7
     t, w = drive(600)
     found = make("noncongruent", shape="centre", amplitude=amplitude, centre=centre, width=width)
@@ -767,7 +767,7 @@ def test_loop_centre_against_a_sum_of_relays() -> None:
 @pytest.mark.parametrize("effect", [e for e in EVERY if e.name == "noncongruent"], ids=label)
 def test_congruency_fails_while_rate_independence_holds(effect: Effect) -> None:
     def loop(centre: float, with_effect: bool) -> Array:
-        """A minor loop about `centre`, from where it starts."""
+        """A minor loop about `centre`, relative to its start."""
         minor = centre + np.concatenate([np.linspace(-1, 1, 200), np.linspace(1, -1, 200)[1:]])
         v = np.concatenate([[0.0, -4.0], minor, minor])
         y = Chain(CASCADE, [effect] if with_effect else []).simulate([Run(np.arange(len(v)) * 1.0, v)])[0][-399:]
@@ -796,9 +796,9 @@ def test_rate_dependence_and_noncongruency_act_together() -> None:
 
 
 def test_ageing_against_the_distance_travelled() -> None:
-    """Against 50 digits: a distance of k moves and its quotient are k + 2 roundings off, of which `exp(-x)` passes on
-    at most 1/e and `log10(1 + x)` 1/ln 10; a function of the library is within 4 units in the last place, and each
-    product and sum rounds once."""
+    """Against 50 digits. A distance of k moves and its quotient have k + 2 roundings, of which `exp(-x)` passes on at
+    most 1/e and `log10(1 + x)` 1/ln 10. Library functions are within 4 units in the last place, and each product and
+    sum rounds once."""
     t, v = uneven()
     u, k, loss = 2.0**-53, len(v), 0.05
     moves = [abs(Fraction(b) - Fraction(a)) for a, b in itertools.pairwise(v.tolist())]
@@ -830,7 +830,7 @@ def test_ageing_against_the_distance_travelled() -> None:
 
 
 def test_curved_drift_is_a_changing_rate() -> None:
-    """Against the exact number: three roundings, halving is none."""
+    """Against the exact number: there are three roundings, since halving is exact."""
     t, v = drive()
     rate, change = 0.4, -0.3
     y = make("drift", shape="curved", rate=rate, change=change).added(Run(t, v))
@@ -865,7 +865,7 @@ def test_self_heating_against_an_ode_solver() -> None:
     solved = integrate.solve_ivp(rate, (0, t[-1]), [0.0], t_eval=t, rtol=1e-8, atol=1e-10, max_step=t[1])
     effect = make("thermal", source="self_heating", gain_per_degree=1.0, time_constant=tau, heating=heating)
     rise = effect.gain(Run(t, v)) - 1.0
-    # Heat is spread over each step: the difference is of the second order in the step
+    # The effect spreads the heat over each step, which makes a difference of second order in the step
     assert np.max(np.abs(rise - solved.y[0])) < 2e-3 * np.max(rise)
 
 
@@ -890,8 +890,8 @@ def test_heat_of_hysteresis_is_what_many_plays_lose() -> None:
         moved = np.minimum(np.maximum(z, x - r), x + r)
         slip = np.abs(moved - z)
         lost[k] = np.sum(r * slip) * (reach / plays)
-        # Slip is straight over r between kinks, with slopes up to 2: the midpoint rule misses h^3/24 of a second
-        # derivative of 4 in each cell, and h^2/8 of a jump by 4 r at a kink, which shows in second differences
+        # Between kinks the slip is straight in r, with slopes up to 2. The midpoint rule misses h^3/24 times a second
+        # derivative of 4 in each cell, and h^2/8 times a jump of 4 r at a kink, which shows in second differences
         kinks = np.count_nonzero(np.abs(np.diff(slip, 2)) > 1e-9) + 1
         unsure[k] = (reach / plays) ** 2 * reach * (4.0 / 24.0 + kinks * 4.0 / 8.0)
         z = moved
@@ -918,7 +918,7 @@ def test_heat_of_small_loops_grows_with_the_cube_of_the_amplitude() -> None:
         "thermal", source="hysteresis", gain_per_degree=1.0, time_constant=1.0, heating=heating, reach=10.0
     )
     rise = effect.gain(Run(t, v)) - 1.0
-    # samples meet the turning points, and a mean over whole periods is that of the heat, but for the approach to it
+    # samples hit the turning points, so the mean over whole periods is exact except for the approach to it
     left = 2.0 * math.exp(-t[-2000])
     assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * 2 / 3 * amplitude**3, rel=left)
 
@@ -1079,7 +1079,7 @@ def test_loading_a_plain_model_imports_no_effect() -> None:
 
 
 def test_a_model_imports_the_folders_of_its_effects_alone(tmp_path: Path) -> None:
-    """From the file to the simulated displacement; the inverse of a chain still has every block of the catalogue."""
+    """This holds from the file to the simulated displacement; the inverse of a chain still imports every block."""
     path = tmp_path / "a.yaml"
     path.write_text(
         "hystgen: 1\nname: a\ninput_range: [0, 1]\nmodel:\n  pi: {thresholds: [0, 0.2], weights: [1, 1]}\n"
@@ -1247,7 +1247,7 @@ def test_an_own_effect_may_move_the_plays_and_others_bend_them(tmp_path: Path) -
     play = 0.0
     for y, x in zip(model.simulate(v, t=np.arange(500.0)), v, strict=True):
         play = min(max(play, x - 2.0), x + 2.0)
-        # six roundings on either side, of numbers no larger than these terms together
+        # six roundings on either side, each of a number no larger than the sum of these terms
         exact, size = 1.5 * x + 0.75 * (play + 0.5 * play * play), 1.5 * abs(x) + 0.75 * abs(play) * (1 + abs(play))
         assert abs(y - exact) <= 12 * 2.0**-53 * size
 

@@ -1,4 +1,4 @@
-"""Hints to install an extra: the command works where hystgen came from."""
+"""Hints to install an extra: the command installs from where hystgen came from."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 @pytest.mark.parametrize("extra", sorted(PROJECT["optional-dependencies"]))
 def test_from_a_checkout_the_checkout_is_installed(extra: str) -> None:
-    """Not a package of that name from an index, on which there may be another one or none."""
+    """The hint does not name a package on an index, where hystgen may be missing or another project."""
     option, place = words(extra)
     folder, _, named = place.rstrip("]").partition("[")
     project = tomllib.loads((Path(folder) / "pyproject.toml").read_text())["project"]
@@ -51,7 +51,7 @@ def test_from_a_checkout_the_checkout_is_installed(extra: str) -> None:
 def test_else_from_where_it_was_installed(
     url: dict[str, object] | None, expected: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As pip notes it in direct_url.json (PEP 610)."""
+    """The origin is what pip notes in direct_url.json (PEP 610)."""
     text = None if url is None else json.dumps(url)
     monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "hystgen" / "basics" / "extras.py"))
     monkeypatch.setattr(importlib.metadata, "distribution", lambda _: SimpleNamespace(read_text=lambda _: text))
@@ -69,7 +69,7 @@ def test_pip_is_that_of_the_python_that_runs(tmp_path: Path, monkeypatch: pytest
 
 
 def required(requirements: list[str]) -> set[str]:
-    """Names of the distributions, those of extras of this package among them."""
+    """Names of the required distributions, including those of this package's extras."""
     found = set()
     for text in requirements:
         name, named = re.match(r"([\w.-]+)(?:\[([\w,-]+)\])?", text).groups()
@@ -106,6 +106,6 @@ def test_all_is_every_extra_for_users() -> None:
 
 
 def test_no_hint_is_written_by_hand() -> None:
-    """Every message takes it from there."""
+    """Every message takes its hint from `extras`."""
     texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "hystgen").rglob("*.py")}
     assert [path.name for path, text in texts.items() if "pip install" in text] == ["extras.py"]

@@ -1,6 +1,6 @@
-"""Wrong samples decide nothing: wherever they are, the fit is that of the record without them.
+"""Wrong samples do not change a fit: wherever they are, it is that of the record without them.
 
-The oracle is a fit to the clean record with the sample deleted, its prediction by brute force.
+The oracle is a fit to the clean record with the sample deleted; predictions are computed by brute force.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def predicted(fit: Any) -> Array:
 
 
 def apart(one: Any, other: Any) -> float:
-    """Largest difference of two fits' predictions over their span."""
+    """Largest difference between the predictions of two fits, as a share of their span."""
     a, b = predicted(one), predicted(other)
     return float(np.max(np.abs(a - b)) / np.ptp(a))
 
@@ -79,7 +79,7 @@ GIVEN: dict[str, Any] = {"history": [0.0], "thresholds": THRESHOLDS}
 
 @functools.cache
 def fit_without(name: str, k: int | None) -> Any:
-    """The fit to the record of a drive without a sample, or with all; many cases compare with the same one."""
+    """The fit to the record of a drive without sample k, or with all; cached because many cases need the same one."""
     whole = record(DRIVES[name], output(DRIVES[name]))
     return hystgen.identify(whole if k is None else less(whole, [k]), **GIVEN)
 
@@ -109,12 +109,12 @@ class TestOneWrongSample:
             inside, n = int(rng.integers(8, len(v) - 8)), len(v)
             k = {"first": 0, "second": 1, "last but one": n - 2, "last": n - 1, "inside": inside}[place]
             if place == "inside" and name == "coarser" and min(v[k], 100.0 - v[k]) < 20.0:
-                k += 4  # the record without a tip is another one
+                k += 4  # deleting a tip would change the record
             by = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 3.0))
             wrong = {"v": v.copy(), "y": y.copy()}
             wrong[channel][k] += by * np.ptp(wrong[channel])
             fit = hystgen.identify(record(wrong["v"], wrong["y"]), **GIVEN)
-            # without its first drive it would begin elsewhere
+            # without its first drive the record would begin elsewhere
             clean = fit_without(name, None if (place, channel) == ("first", "y") else k)
             assert apart(fit, clean) < 0.005, (k, by)
             assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), (k, by)
@@ -151,7 +151,7 @@ class TestOneWrongSample:
             assert not any("outside the fitted range" in text for text in fit.warnings)
 
     def test_a_pulse_that_the_output_follows_stays(self) -> None:
-        """At once, or late: behind a lag of several samples."""
+        """The output follows at once, or late behind a lag of several samples."""
         for k in (600, len(DRIVES["fading"]) - 60):
             for lag in (0.0, 0.5, 0.8):
                 v = DRIVES["fading"].copy()
@@ -184,7 +184,7 @@ class TestOneWrongSample:
 
 
 class TestOneWrongRow:
-    """Drive and output wrong together: a lost packet, a row of another moment, exchanged cells, a doubled row."""
+    """Drive and output are both wrong: a lost packet, a row of another time, exchanged cells, values at an end."""
 
     KINDS: ClassVar[dict[str, Callable[[Array, Array, int], tuple[float, float]]]] = {
         "zeros": lambda _v, _y, _k: (0.0, 0.0),
@@ -197,7 +197,7 @@ class TestOneWrongRow:
     @pytest.mark.parametrize("name", ["lines", "fading"])
     @pytest.mark.parametrize("kind", KINDS)
     def test_the_fit_is_that_of_the_record_without_it(self, name: str, kind: str) -> None:
-        """Inside a record where a pulse of the drive would have left its memory, and at its end."""
+        """The row is inside a record, where a real pulse of the drive would have left its memory, or at its end."""
         v = DRIVES[name]
         y = output(v)
         rng = np.random.default_rng([len(name), len(kind)])
@@ -221,7 +221,7 @@ class TestOneWrongRow:
 
     @pytest.mark.parametrize("history", [(0.0,), None])
     def test_at_the_end_it_hides_no_memory(self, history: tuple[float, ...] | None) -> None:
-        """The largest drive of a record, if real, would make the memory known in its last row only."""
+        """If the wrong drive, the largest, counted as real, the memory would be known only in the last rows."""
         v = DRIVES["fading"]
         y = output(v)
         clean = hystgen.identify(record(v[:-2], y[:-2]), history=history)
@@ -249,7 +249,7 @@ class TestNoneInCleanRecords:
     @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])
     @pytest.mark.parametrize("grain", [0.0, 0.08, 0.3])
     def test_of_all_kinds(self, noise: float, grain: float) -> None:
-        """Triangles and sines of few samples, staircases, noise as a drive, sweeps; fine and coarse converters."""
+        """Triangles and sines of few samples, staircases, random drives and sweeps; fine and coarse converters."""
         rng = np.random.default_rng(5)
         t = np.arange(3000)
         drives = {
@@ -285,7 +285,7 @@ class TestNoneInCleanRecords:
 
     @pytest.mark.data
     def test_measured_ones(self, measured: Path) -> None:
-        """None but two samples of a cracking column, where the force drops at once."""
+        """No sample of the measured records or the examples is taken for wrong."""
         files = [*sorted(measured.glob("*.csv")), *sorted((measured / "more").glob("*.csv"))]
         assert len(files) > 3
         for path in [*files, *EXAMPLES.glob("*.csv")]:
@@ -300,7 +300,7 @@ class TestNoneInCleanRecords:
 class TestFigures:
     @pytest.mark.parametrize("value", [-200.0, 9.91e37, -9.9e37, -999999.0])
     def test_percentages_are_of_what_was_compared(self, value: float, tmp_path: Path, run: Run) -> None:
-        """In the table, in the comments of the file, in the summary of a fleet."""
+        """This holds in the table, in the comments of the file and in the summary of a fleet."""
         v, other = DRIVES["lines"], wander(7)
         clean, spoilt = output(v, 0.1), output(v, 0.1)
         spoilt[900] = value
@@ -379,7 +379,7 @@ def scaled(channel: str, factor: float) -> Callable[[Array, Array], tuple[Array,
 
 
 class TestSizes:
-    """Whatever the numbers, a model or one message, and nothing else on stderr."""
+    """Numbers of any size give a model or a message of one line, and nothing else on stderr."""
 
     @pytest.mark.slow(one_in=2)
     @pytest.mark.parametrize("command", ["identify", "diagnose"])
@@ -396,12 +396,12 @@ class TestSizes:
     @pytest.mark.parametrize("command", ["identify", "diagnose"])
     @pytest.mark.parametrize("level", [14.0, 9.0, 2.0, 0.05])
     def test_a_sensor_at_its_end(self, command: str, level: float, tmp_path: Path) -> None:
-        """Most of the record, or all but nothing of it."""
+        """Part of the record is at the sensor's end, or most, or nearly all of it."""
         data = write_csv(tmp_path / "a.csv", DRIVES["fading"], np.minimum(output(DRIVES["fading"]), level))
         assert self.answer(command, data, tmp_path) == (0 if level > 5.0 else 2)
 
     def answer(self, command: str, data: Path, folder: Path) -> int:
-        """Exit code of a command with every warning an error; what it writes can be read."""
+        """Exit code of a command with RuntimeWarning as an error; a model that it writes can be loaded."""
         model, out = folder / "model.yaml", folder / "out"
         hystgen.identify(record(DRIVES["lines"], output(DRIVES["lines"]))).write(model)
         words = {"identify": ["identify", str(data), "-o", str(folder / "new.yaml")],
@@ -422,7 +422,7 @@ class TestSizes:
         return done.returncode
 
     def test_records_in_memory(self) -> None:
-        """Without a file nothing was dropped on reading."""
+        """Without a file no sample is dropped on reading; the fit leaves them out itself."""
         v, y = DRIVES["fading"], output(DRIVES["fading"])
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
@@ -466,7 +466,7 @@ class TestConverterAtItsEnd:
         assert fit.rows[0].rms < 0.01 * (high - low)
 
     def test_backlash_is_none(self) -> None:
-        """There too the output stands at its largest value while the drive moves."""
+        """With backlash too the output stands at its largest value while the drive moves."""
         v = DRIVES["fading"]
         y = brute_output(v, (0.0, 20.0), (0.0, 0.2), 0.0)
         fit = hystgen.identify(record(v, y), thresholds=[0.0, 20.0], history=[0.0])
@@ -476,7 +476,7 @@ class TestConverterAtItsEnd:
 
 class TestTanh:
     def test_no_shape_divides_by_zero(self) -> None:
-        """Within the bounds a branch may be flat to the last digit: it has too little slack, and no length."""
+        """Within the bounds a branch may be flat to the last digit and have no length; its slack is then negative."""
         rng = np.random.default_rng(3)
         for branches in (1, 2):
             front = Tanh((0.0, 3.6), branches)
@@ -489,7 +489,7 @@ class TestTanh:
                 assert (np.min(slack[:branches]) < 0.0) == flat
 
     def test_a_nominal_front_is_met_or_kept(self) -> None:
-        """Where no search may begin at it, it stays as it is."""
+        """A search begins at the nominal front, or the front is kept unchanged if no search may begin there."""
         rng = np.random.default_rng(4)
         searched = 0
         for _ in range(300):
@@ -505,7 +505,7 @@ class TestTanh:
         assert 20 < searched < 280
 
     def test_intervals_of_a_front_at_its_limit(self) -> None:
-        """Shapes drawn around one that is hardly possible are brought to where they are."""
+        """Shapes drawn around a barely admissible one are moved to admissible ones."""
         front = Tanh((0.0, 3.6), 2)
         shape = front.doubled(np.array([0.1, 5.9]))
 
@@ -523,14 +523,14 @@ class TestTanh:
 
 
 class TestInverse:
-    """Every model that `diagnose` writes can be inverted, or it is said why not."""
+    """Every model that `diagnose` writes can be inverted, or a warning says why not."""
 
     def nominal_model(self, folder: Path) -> Path:
         hystgen.identify(record(DRIVES["lines"], output(DRIVES["lines"]))).write(folder / "stage.yaml")
         return folder / "stage.yaml"
 
     def test_p_0_is_raised_where_the_records_hardly_tell(self, tmp_path: Path, run: Run) -> None:
-        """What is missing hides p_0: the sensor is late by half a sample."""
+        """The plant has p_0 = 0 but a play with a small threshold, and noise hides the difference."""
         rng, paths = np.random.default_rng(8), []
         for k in range(3):
             v = wander(20 + k)
@@ -593,7 +593,7 @@ class TestInverse:
 
 
 def test_a_false_history_that_the_fit_could_bend_to(tmp_path: Path) -> None:
-    """The model is not bent to the starts that the history spoils: it is fitted to what does not depend on it."""
+    """The model is not bent to fit starts that the history spoils; it is fitted to samples that do not depend on it."""
     hystgen.identify(record(DRIVES["lines"], output(DRIVES["lines"]))).write(tmp_path / "stage.yaml")
     virgin = []
     for k in range(4):

@@ -1,4 +1,4 @@
-"""Fixed point: whole numbers that both engines agree on, errors inside their bound, and refusals."""
+"""Fixed point: both engines give the same codes, errors stay inside their bounds, and some formats are refused."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def load(name: str) -> Cascade:
 
 
 def records(low: int, high: int, seed: int) -> np.ndarray:
-    """Codes: shrinking swing, nested loops, noise, both rails."""
+    """Codes of a shrinking swing, nested loops, random jumps and both rails."""
     rng = np.random.default_rng(seed)
     k = np.linspace(0, 1, 1500)
     swing = (low + high) / 2 + (high - low) / 2 * np.sin(300 * k) * (1 - 0.9 * k)
@@ -51,7 +51,7 @@ def records(low: int, high: int, seed: int) -> np.ndarray:
 
 @st.composite
 def models(draw: st.DrawFn) -> Cascade:
-    """Valid models of every kind, plays and weights over two decades."""
+    """Valid models with every kind of front; spacings of thresholds span two decades, weights one and a half."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     n = draw(st.integers(0, 24))
     low = draw(st.sampled_from([-1.0, 0.0, -0.2]))
@@ -76,7 +76,7 @@ def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[Fix
 
 
 def double(model: Cascade, operator: str, form: fixed_tables.Format, codes: np.ndarray) -> np.ndarray:
-    """Answers of the double model in codes."""
+    """Answers of the model in double precision, in codes."""
     into, out = form.drive_lsb, form.output_lsb
     if operator == "inverse":
         into, out = out, into
@@ -106,7 +106,7 @@ def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_the_bound_covers_codes_beyond_a_range_that_ends_between_codes(arithmetic: str) -> None:
-    """They are limited to the last code inside, which is not where the double model goes."""
+    """Codes beyond the range are limited to the last code inside; the double model goes on to the end of the range."""
     model = Cascade(PI([0, 0.5, 2], [0.5, 0.7, 0.3], 1.0), (), 0.0, (2.0, 10.0))
     _, form = built(model, arithmetic)
     most = 2 ** {"q31": 31, "q15": 15}[arithmetic] - 1
@@ -117,7 +117,7 @@ def test_the_bound_covers_codes_beyond_a_range_that_ends_between_codes(arithmeti
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_bounds_are_not_slack(arithmetic: str) -> None:
-    """Some model comes to a quarter of its bound, forward and inverse."""
+    """The error of one model reaches a quarter of its bound, forward and inverse."""
     model = Cascade(PI([0, 0.1], [0.7, 0.05]), (), 0.0, (-1.0, 1.0))
     tables, form = built(model, arithmetic)
     codes = records(*(int(x) for x in tables.limits.drives), 1)
@@ -136,7 +136,7 @@ def test_bounds_are_not_slack(arithmetic: str) -> None:
 def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     arithmetic: str, down: tuple[float, float, float, float]
 ) -> None:
-    """It holds while both are on the same branch, and is that of one branch: however far the other one is."""
+    """The bound of the rounding holds while both arithmetics are on one branch, however far away the other one is."""
     pi, ends = PI([0, 0.5, 1.2, 2], [0.7, 0.2, 0.1, 0.05]), (0.0, 10.0)
     up = (6.0, 0.3, -1.4, 5.3)
     model = Cascade(pi, (TanhEnvelope(up, down),), 0.0, ends)
@@ -144,7 +144,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     assert form.inverse_rounding is not None
     single = [Cascade(pi, (TanhEnvelope(branch),), 0.0, ends) for branch in (up, down)]
     alone = [built(each, arithmetic)[1].inverse_rounding or 0.0 for each in single]
-    # the bound takes the steepest and the flattest slope of both branches, and a step as long as one branch's or twice
+    # the bound uses the steepest and flattest slope of both branches, and a step once or twice as long as one branch's
     slopes = [each.front_slopes for each in single]
     both = max(s[1] for s in slopes) / min(s[0] for s in slopes)
     assert form.inverse_rounding <= 2 * max(b * both / (s[1] / s[0]) for b, s in zip(alone, slopes, strict=True))
@@ -163,7 +163,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", FILES)
 def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
-    """Plain Python whole numbers, which cannot overflow, run the reference and every intermediate sum is looked at."""
+    """The reference runs in plain Python integers, which cannot overflow; sums and inputs are checked at each step."""
     model = load(name)
     tables, form = built(model, arithmetic)
     assert form.largest_sum < 2**62
@@ -214,7 +214,7 @@ def test_the_reciprocal_divides_to_the_nearest(d: int, seed: int) -> None:
 @pytest.mark.parametrize("name", ["curved", "two_branches", "mixed", "bent", "behind"])
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
-    """Every code for 16 bits, many for 32: the kernel's curve against the model's own functions."""
+    """The kernel's curve agrees with the model's own functions at every code of q15 and at 20 001 codes of q31."""
     model = load(name)
     tables, form = built(model, arithmetic)
     low, high = (int(x) for x in tables.limits.drives)
@@ -315,7 +315,7 @@ emit: {arithmetic: q15}
     ],
 )  # fmt: skip
 def test_a_refused_format_says_where(tmp_path: Path, change: tuple[str, str], said: list[str]) -> None:
-    """Everything that can be found in one go, at its place in the file, and nothing written."""
+    """All problems are reported in one run, each at its place in the file, and nothing is written."""
     text = NARROW.replace(*change)
     if "density" in text:
         text = text.replace("    weights: [1, 1, 1, 1e-7]\n", "")
@@ -360,7 +360,7 @@ def test_simulating_on_the_command_line_speaks_of_codes(tmp_path: Path) -> None:
 
 
 def test_no_entry_of_a_curve_passes_its_type() -> None:
-    """Branches so close that the inverse of one passes the end of the drive's range, the last code, by some codes."""
+    """Two branches are so close that the inverse of one passes the last code of the drive's range by some codes."""
     up, down = (3016.367098, 0.0009851513036, -0.04454608924, 134.2785509), (
         3016.461353, 0.0009842729487, 0.04718115382, 131.2839223
     )  # fmt: skip
@@ -378,7 +378,7 @@ def test_an_output_that_stays_0_is_refused(arithmetic: str) -> None:
 
 
 def straight(breaks: int, stages: int) -> Cascade:
-    """Dead-zone sums with many breaks, which bend the curve by little each."""
+    """Dead-zone sums with many breaks, each of which bends the curve only slightly."""
     half = breaks // 2
     thresholds = [k / breaks for k in range(-half, half + 1)]
     weights = [1.0 if r == 0.0 else math.copysign(0.1, r) / breaks for r in thresholds]
@@ -386,7 +386,7 @@ def straight(breaks: int, stages: int) -> Cascade:
 
 
 def test_thousands_of_breaks_take_seconds() -> None:
-    """Work in proportion to the breaks: before, 64 in each of two stages took 15 s, and thousands took hours."""
+    """The work is proportional to the breaks; 64 in each of two stages used to take 15 s, and thousands took hours."""
     start = time.process_time()
     for arithmetic in ("q31", "q15"):
         fixed_tables.build(straight(400, 2), arithmetic, "loop", None, None)

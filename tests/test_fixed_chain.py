@@ -1,4 +1,4 @@
-"""Models with effects in q31 and q15: their bounds, no overflow whatever is called, no stall and no cycle."""
+"""Models with effects in q31 and q15: bounds hold, no call overflows, and states neither stall nor cycle."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_factors_are_multiplied_like_fractions() -> None:
 
 
 def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, Run]:
-    """A smooth reference with plateaus in codes, over a share of the output range, and the same in physical units."""
+    """A smooth reference with plateaus over a share of the output range, in codes and in physical units."""
     rng = np.random.default_rng(seed)
     low, high = (float(end) for end in one.tables.limits.outputs)
     still = rng.random(N) < 0.2
@@ -100,7 +100,7 @@ STILL = {
 }
 
 BRANCHED = ("lagging", "aged", "everything", "relaxing")
-"""Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
+"""Chains whose memoryless part has two branches: fixed point sometimes takes the other branch for a sample."""
 
 
 @pytest.mark.slow(one_in=2)
@@ -109,7 +109,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
 def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: float) -> None:
-    """Against the compensator and the chain in double precision, which share no code with it."""
+    """Errors against the compensator and the chain in double precision, which share no code with fixed point."""
     one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, seed, share)
@@ -126,12 +126,12 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
         forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
         y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
         most = int(numbers.tables.limits.code_max[0])
-        y = np.clip(y, -most - 1, most)  # a mode that rings may leave the codes
+        y = np.clip(y, -most - 1, most)  # a ringing mode may leave the range of codes
         assert np.max(np.abs(forward - y)) <= codes.forward_error
 
 
 def shaken(one: Compiled, n: int, rate: float) -> Array:
-    """Up to the middle as fast as bounds hold for, then to and fro by such a step, creeping up by `rate` of it."""
+    """Ramp to mid-range at the largest step that bounds allow, then to and fro by it, creeping up by `rate` of it."""
     low, high = one.static.input_range
     step = 0.999 * one.largest_step
     up = np.arange(low, 0.5 * (low + high), step)
@@ -140,7 +140,7 @@ def shaken(one: Compiled, n: int, rate: float) -> Array:
 
 
 def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[float, float]:
-    """Largest error of the forward operator for a drive, and its bound, output units."""
+    """Largest error of the forward operator for a drive, and its bound, both in output units."""
     codes, t = numbers.codes, np.arange(len(v)) * T
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
     bound = bounds.chain_bounds(numbers, arithmetic).forward if codes is None else codes.forward_error * output
@@ -158,7 +158,7 @@ def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[flo
 def test_bounds_of_viscous_plays_hold_for_a_shaken_drive_and_are_reached(
     name: str, n: int, rate: float, arithmetic: str
 ) -> None:
-    """Plays come into contact and leave it inside each step: what the C takes in place of the law there adds up."""
+    """Plays gain and lose contact inside each step, where the C's approximation of the law has errors that add up."""
     one = model(CHAINS[name])
     numbers = tables.build(one.chain, arithmetic, T)
     worst, bound = wrong(one, arithmetic, numbers, shaken(numbers, n, rate))
@@ -175,7 +175,7 @@ SOFT = "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponen
     "text", [CHAINS["viscous"], chain("linear", LINEAR), chain("soft", SOFT)], ids=["viscous", "linear", "soft"]
 )
 def test_bounds_of_inverses_of_viscous_plays_hold_for_such_drives_and_are_reached(text: str, arithmetic: str) -> None:
-    """Asked for where the model has been, the inverse undoes part of what its plays do otherwise than the model's."""
+    """Given the model's own output as reference, the inverse undoes part of the error of its plays."""
     one = model(text)
     numbers = tables.build(one.chain, arithmetic, T)
     codes = numbers.codes
@@ -193,14 +193,14 @@ def test_bounds_of_inverses_of_viscous_plays_hold_for_such_drives_and_are_reache
 
 
 def found_input(p: Array, d: Array, shift: Array, rate: Array) -> tuple[float, Array]:
-    """e with `p_0 e + sum p_i d_i = 0` after each play has gone a share of its way to e and its shift."""
+    """e with `p_0 e + sum p_i d_i = 0` after each play has moved by its share `rate` towards e plus its shift."""
     kept = (1.0 - rate) * d + rate * shift
     e = -float(p[1:] @ kept) / float(p[0] + p[1:] @ rate)
     return e, kept + rate * e
 
 
 def test_the_inverse_undoes_shifts_of_the_plays_input() -> None:
-    """All ways in which up to three plays can be shifted, one after the other; then plays that follow in part."""
+    """Three, two and one plays are shifted in turn, in all combinations of signs; then plays follow only in part."""
     rng = np.random.default_rng(8)
     for _ in range(6):
         p = 10.0 ** rng.uniform(-1.0, 0.5, 4)
@@ -226,7 +226,7 @@ def test_the_inverse_undoes_shifts_of_the_plays_input() -> None:
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str) -> None:
-    """From laws that give way within a step to those that hardly yield in a record."""
+    """The laws range from those that yield fully within a step to those that hardly yield in a whole record."""
     rng = np.random.default_rng(17)
     for _ in range(8):
         tau, exponent = 10.0 ** rng.uniform(-4.0, 1.0), rng.uniform(0.3, 4.0)
@@ -238,7 +238,7 @@ def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str
 
 
 def swept(one: Compiled, n: int) -> Array:
-    """To and fro over the whole range as fast as bounds hold for, from its lower end."""
+    """Drive to and fro over the whole range from its lower end, at the largest step that bounds allow."""
     low, high = one.static.input_range
     way = 0.999 * one.largest_step * np.arange(n)
     return high - np.abs(way % (2.0 * (high - low)) - (high - low))
@@ -246,7 +246,7 @@ def swept(one: Compiled, n: int) -> Array:
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
-    """The fastest rate is one at which the gain stays within its limits, here after eight time constants."""
+    """At the fastest rate that bounds allow, the gain stays within its limits, here after eight time constants."""
     heat = "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.4, gain_per_degree: -0.02"
     one = model(chain("hot", heat, compensate="self_heating"))
     numbers = tables.build(one.chain, arithmetic, T)
@@ -260,8 +260,8 @@ def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
 @BOTH
 @pytest.mark.parametrize("name", ["heated", "rubbed"])
 def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, arithmetic: str) -> None:
-    """The inverse takes the gain before the last move, which counts most where the drive turns at an end. Half of the
-    bound for the heat of loops is what few plays miss; the most of that takes nested loops in an order of their own."""
+    """The inverse uses the gain before the last move, which matters most where the drive turns at an end. Half of the
+    bound for the heat of loops covers the error of few plays, which peaks only in a special order of nested loops."""
     one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     v = swept(numbers, N)
@@ -278,7 +278,7 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, 
 @pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])
 @BOTH
 def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
-    """Behind a lag that is led, as it does after the same drives."""
+    """Behind a lag that is led, the answers are those of double precision after the same drives."""
     one = model(chain("led", *STILL[name]))
     numbers, codes = compiled(one, arithmetic)
     drive = float(codes.drive_lsb)
@@ -301,7 +301,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
 @pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
-    """Whatever is limited: each answer of the tables in float64, to which the drives are committed that were sent."""
+    """Even where drives are limited, answers agree with the float64 tables to which the same drives were committed."""
     one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     double = tables.build(one.chain, "float64", T)
@@ -337,7 +337,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
 
 @BOTH
 def test_branches_are_mostly_the_same(arithmetic: str) -> None:
-    """With two branches nine tenths of the samples are as near as one branch promises."""
+    """With two branches, nine tenths of the samples stay within the rounding bound of a single branch."""
     one = model(CHAINS["lagging"])
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, 5, 0.5)
@@ -382,7 +382,7 @@ int main(int count, char **given)
 
 
 def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int) -> tuple[Any, Any]:
-    """Calls in any order; codes at random, at the ends, from end to end, and those of a walk."""
+    """Calls in random order; codes are random, near 0 or the ends, at either end, or those of a random walk."""
     op = rng.choice(kinds, n).astype(np.uint8)
     op[rng.random(n) < 0.0005] = slots.OP_INIT
     info = np.iinfo(real)
@@ -400,8 +400,8 @@ def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int
 def checked(
     folder: Path, one: Model, arithmetic: str, flags: list[str], wrong: str = ""
 ) -> Iterator[tuple[str, Array, Array, subprocess.CompletedProcess[bytes]]]:
-    """Of each operator its name, random calls and what they are given, and the C with the checks of `granted_states`,
-    compiled and run with them; `wrong`: a bound that is a 64th of what it should be."""
+    """For each operator: its name, random calls, their arguments, and the run of the compiled C with the checks of
+    `granted_states`; `wrong` names a bound to be reduced to a 64th, so that a check fails."""
     own, n = one.name, 20_000
     options = emit_options(one, "inverse" if own in INVERSE_ALONE else "both", arithmetic, "loop")
     written = sources.write(folder, one, options)
@@ -427,7 +427,7 @@ PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 @pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """States stay within what their formats were chosen by, as the proof takes for granted."""
+    """States stay within the ranges that their formats were chosen for and that the proof takes for granted."""
     one, real = model(PROVED[name]), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, "loop")
     flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
@@ -455,7 +455,7 @@ def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_pat
 @BOTH
 @pytest.mark.parametrize("name", ["everything", "worn", "quick", "warm"])
 def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every factor of a product stays below 2^51, and every sum below 2^63, in Python's own whole numbers."""
+    """Run in Python's own integers, every factor of a product stays below 2^51 and every sum below 2^63."""
     one = model(CHAINS[name])
     numbers = one.tables(arithmetic, "loop")
     inverse = name in INVERSE_ALONE
@@ -472,7 +472,7 @@ def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypa
         return plain(value, mantissa, shift)
 
     monkeypatch.setattr(factors.times, "py_func", watched)
-    monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))  # all of them ask for it
+    monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))  # every kernel is run through it
     with np.errstate(over="raise"):
         reference.answers(numbers, inverse, call, x, compiled=False)
     assert 2**30 < largest < factors.LARGEST
@@ -482,7 +482,7 @@ def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypa
 @BOTH
 @pytest.mark.parametrize("bits", [20, 28])
 def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None:
-    """tau/T of 2^20 and 2^28: after a step of the drive the state goes where it would go without rounding."""
+    """With tau/T of 2^20 and 2^28, a step of the drive moves the state as far as it would without rounding."""
     tau = 2.0**bits * T
     one = model(chain("slow", f"name: creep, time_constants: [{tau}], weights: [0.1]"))
     numbers, codes = compiled(one, arithmetic)
@@ -500,7 +500,7 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
 @BOTH
 @pytest.mark.parametrize("name", STILL)
 def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
-    """Creep, once it is within rounding, ends in no change at all; behind a lag a code either way is left."""
+    """With creep alone, the drive stops changing once within rounding; behind a lag a code either way may remain."""
     one = model(chain("still", *STILL[name]))
     numbers, _ = compiled(one, arithmetic)
     low, high = (int(end) for end in numbers.tables.limits.outputs)
@@ -514,7 +514,7 @@ def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
 
 
 def test_a_drift_is_counted_without_rounding() -> None:
-    """Slopes and changes that meet, turn or hardly move, up to where the clock stops, against fractions."""
+    """Drifts that turn, stop or hardly move agree with exact fractions, up to the sample where the clock stops."""
     rng = np.random.default_rng(0)
     for _ in range(200):
         rate = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6, -1))
@@ -555,7 +555,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
 
 @BOTH
 def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
-    """Whatever was applied, the next reference is reached to the bound of a step at rest."""
+    """Whatever drive was committed, the next reference is reached to within the forward bound and one drive code."""
     one = model(CHAINS["creeping"])
     numbers, codes = compiled(one, arithmetic)
     rng = np.random.default_rng(3)
@@ -603,7 +603,7 @@ def test_the_selftest_goes_all_over_the_range(arithmetic: str) -> None:
 @BOTH
 @pytest.mark.parametrize("name", ["bumpy", "viscous"])
 def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) -> None:
-    """Curves of polynomials against the effect's own formula, where plays can be."""
+    """The polynomials agree with the effect's own formula wherever plays can be."""
     one = model(CHAINS[name])
     numbers, _ = compiled(one, arithmetic)
     static, t = one.cascade, numbers.tables
@@ -625,8 +625,8 @@ def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) ->
 @BOTH
 @pytest.mark.parametrize(("exponent", "ratio"), [(2.5, 5.0), (0.5, 2.0), (3.0, 2.0**28), (1.5, 0.1)])
 def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, arithmetic: str) -> None:
-    """Stretches over all decades against the exact law, to a thousandth of what it yields and a step, or to what the
-    least stretch that the table tells apart yields, or hardly anything in 2^28 steps. Never more than the stretch."""
+    """Stretches over all decades yield as the exact law does, to a thousandth, a step, what the table's least stretch
+    yields, and 2^-40 of the stretch. No stretch yields more than itself."""
     text = f"name: rate_dependence, shape: relaxation, time_constant: {ratio * T}, exponent: {exponent}"
     one = model(chain("yields", text))
     numbers, codes = compiled(one, arithmetic)
@@ -648,7 +648,7 @@ def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, ari
 @pytest.mark.parametrize("rubs", [False, True])
 @pytest.mark.parametrize("bits", [0, 10, 28])
 def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bool) -> None:
-    """Time constants up to 2^28 samples, against the same recursion in whole fractions of a degree's 2^100th."""
+    """For time constants up to 2^28 samples, the rise agrees with the same recursion in units of 2^-100 degrees."""
     about = ARITHMETICS[arithmetic]
     largest, lsb, seconds = about.code_max, 4.0 / about.code_max, 1e-3
     tau, ends = 0.7 * seconds * 2.0**bits, (-4.0, 4.0)
@@ -683,7 +683,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
             worst = max(worst, abs(int(state.block.rise[0]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each
         assert worst <= one.error < 0.1 * peak / 2**100
-        warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # what proofs take for granted is kept even from there
+        warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # even from there the state stays within what proofs assume
         state.block.rise[0] = warmest
         thermal_fixed.heat_move(t, state, 0, np.int64(-largest), np.int64(largest))
         assert 0 <= state.block.rise[0] <= warmest
@@ -694,7 +694,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
 def test_status_tells_at_either_end_that_a_saturation_has_no_input(
     arithmetic: str, level: float, centre: float
 ) -> None:
-    """The limits may lie around any output, and on one side of 0; an offset moves a reference there."""
+    """The limits may lie around any output, even both on one side of 0; an offset moves a reference past them."""
     one = model(chain("limited", f"name: saturation, level: {level:g}, centre: {centre:g}"))
     numbers = tables.build(one.chain, arithmetic, T)
     scale = 1.0 if numbers.codes is None else 1.0 / float(numbers.codes.output_lsb)
@@ -713,7 +713,7 @@ def test_status_tells_at_either_end_that_a_saturation_has_no_input(
 @BOTH
 @pytest.mark.parametrize("options", [{"resonance": "notch"}, {"resonance": "shaper"}, {"noise_gain": 4.0}])
 def test_weights_of_the_reference_stay_within_bounds_and_come_to_rest(arithmetic: str, options: dict[str, Any]) -> None:
-    """Against float64 with the same weights, which answers the same codes; behind a step nothing moves any more."""
+    """Answers are those of float64 tables with the same weights; after a step of the reference nothing moves on."""
     one = model(chain("weighed", "name: resonance, frequency: 30, damping: 0.05"))
     how = Compensation(**options)
     numbers, double = (tables.build(one.chain, each, T, how) for each in (arithmetic, "float64"))

@@ -1,4 +1,4 @@
-"""A fleet of units in one call: what it writes, what it marks, and that nothing stops it for good."""
+"""Identification of a fleet of units in one call: files written, outliers marked, and failures that it survives."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ P = np.array([0.3, 0.1, 0.1, 0.05, 0.04])
 
 
 def plant(k: int, samples: int = 20) -> tuple[Any, Any]:
-    """Drive and output of a unit: every weight differs a little from unit to unit."""
+    """Drive and output of a unit, whose weights differ a little from those of other units."""
     weights = P * np.random.default_rng(500 + k).normal(1.0, 0.03, len(P))
     v = wander(k, turns=30, samples=samples)
     return v, noisy(brute_output(v, R, weights, 0.0), 0.05, seed=k)
 
 
 def make_units(folder: Path, number: int, spoilt: bool = True) -> Path:
-    """Recordings of units; among many, one of a worn plant and one with noise."""
+    """Recordings of units; larger fleets include a worn plant and a noisy record."""
     folder.mkdir(parents=True)
     for k in range(number):
         v, y = plant(k)
@@ -74,7 +74,7 @@ def rows(folder: Path) -> dict[str, dict[str, str]]:
 
 
 def by_hand(values: list[float]) -> list[float]:
-    """Modified z-scores with the standard library alone."""
+    """Modified z-scores, computed with the standard library alone."""
     middle = statistics.median(values)
     mad = statistics.median(abs(x - middle) for x in values)
     return [0.6745 * (x - middle) / mad for x in values]
@@ -87,7 +87,7 @@ def units(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def fleet(units: Path) -> Path:
-    """What one process in a row makes of the units."""
+    """Results of a single process that identifies the units one after another."""
     folder = units.parent / "params"
     hystgen.identify_batch(units / "*.csv", folder, jobs=1)
     return folder
@@ -102,7 +102,7 @@ def few(tmp_path: Path) -> Path:
 
 
 def test_the_command(units: Path, fleet: Path, tmp_path: Path, run: Run) -> None:
-    """Two processes write what one writes, the command what the call does."""
+    """Two processes write the same bytes as one, and the command the same as the Python call."""
     output = tmp_path / "new" / "params"
     code, out, err = run("identify", "--batch", units / "*.csv", "-o", output, "--jobs", 2)
     assert (code, out.split()) == (1, [str(output / "summary.csv")])
@@ -184,7 +184,7 @@ def test_outliers_by_hand_with_the_planted_ones_among_them(fleet: Path) -> None:
 
 
 def test_few_units_are_not_judged(few: Path, tmp_path: Path, run: Run) -> None:
-    """An unquoted pattern arrives as several words; a folder is as good."""
+    """A pattern that the shell expands to several files gives the same result as their folder."""
     code, _, err = run("identify", "--batch", *sorted(few.iterdir()), "-o", tmp_path / "a", "--no-emit")
     assert code == 0
     assert "outliers are marked only with 8 or more units" in err
@@ -238,13 +238,13 @@ def test_what_nobody_expected_stops_no_other(few: Path, tmp_path: Path, monkeypa
     assert len(done.units) == 3
 
 
-# -- going on from there -----------------------------------------------------------------------------------------------
+# -- resuming ----------------------------------------------------------------------------------------------------------
 
 
 def redone(folder: Path, again: Callable[[], Any]) -> set[str]:
-    """Units whose parameter files are written anew by a call."""
+    """Units whose parameter files a call rewrites."""
     before = {path.stem: path.stat().st_ino for path in folder.glob("*.yaml")}
-    held = [path.open() for path in folder.glob("*.yaml")]  # so that no inode is used twice
+    held = [path.open() for path in folder.glob("*.yaml")]  # so that no inode is reused
     again()
     for stream in held:
         stream.close()
@@ -312,7 +312,7 @@ def test_notes_that_cannot_be_read_are_one_warning(kind: str, few: Path, tmp_pat
     for note in notes[:2]:
         UNREADABLE[kind](note)
     code, _, err = run(*words)
-    if kind == "a folder":  # which no file can take the place of
+    if kind == "a folder":  # a file cannot replace a folder
         assert (code, err.count(" cannot be written: ")) == (1, 2)
         return
     assert code == 0
@@ -386,7 +386,7 @@ def test_a_unit_that_kills_its_process_stops_no_other() -> None:
 
 
 def interrupted(task: Task) -> UnitResult:
-    """Work that Ctrl-C reaches, as it does every process of a terminal."""
+    """Work interrupted by Ctrl-C, which reaches every process of a terminal."""
     os.kill(os.getpid(), signal.SIGINT)
     return UnitResult(task.unit, "done")
 
@@ -415,7 +415,7 @@ def cluster() -> Iterator[Any]:
 def test_a_cluster_of_which_a_worker_dies(
     cluster: Any, units: Path, fleet: Path, tmp_path: Path, run: Run
 ) -> None:
-    """The same command with an address: the same bytes, whatever becomes of a worker."""
+    """With a scheduler's address, the same command writes the same bytes even though a worker dies."""
     from distributed import Client
 
     output = tmp_path / "params"
@@ -461,7 +461,7 @@ def test_nothing_more_is_said_of_a_scheduler_when_the_program_ends(few: Path, tm
 
 
 def test_a_scheduler_that_dies_is_one_message(units: Path, tmp_path: Path) -> None:
-    """Without the tracebacks that Dask logs."""
+    """The tracebacks that Dask logs are not shown."""
     output = tmp_path / "params"
     code = (
         "import os, sys\n"
@@ -553,7 +553,7 @@ def test_modified_scores() -> None:
     assert outliers.modified_scores([1, 2, 3, 4, 5, 6, 100]) == pytest.approx(
         [0.6745 * x / 2.0 for x in (-3, -2, -1, 0, 1, 2, 96)]
     )
-    # Most alike, so that MAD is 0: mean absolute deviation 1, sqrt(2/pi) = 0.797885
+    # Most values are equal, so MAD is 0: mean absolute deviation 1, sqrt(2/pi) = 0.797885
     assert outliers.modified_scores([5.0] * 9 + [15.0]) == pytest.approx([0.0] * 9 + [7.97885], abs=1e-4)
     assert outliers.modified_scores([2.0] * 8) == [0.0] * 8
     assert outliers.modified_scores([2.0, 2.0 + 1e-12] * 4) == [0.0] * 8

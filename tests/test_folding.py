@@ -1,4 +1,4 @@
-"""What the emitted C does not need is not in it, seen by a parser of C that shares nothing with the emission."""
+"""Emitted C contains nothing that it does not need, as seen by a C parser that shares no code with the emission."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ HEADERS = {
         for word in [f"{'un' * bool(sign)}signed {kind}"]
     ),
 }  # fmt: skip
-"""Of the language, in the words that the parser knows."""
+"""Standard headers, reduced to declarations that the parser understands."""
 
 THREE = chain(
     "three", "name: lag, time_constant: 0.004", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", CREEP
@@ -71,18 +71,18 @@ def below(node: c_ast.Node) -> Iterator[c_ast.Node]:
 
 
 def statements(function: c_ast.FuncDef) -> list[c_ast.Node]:
-    """Of a function, without those that only name a parameter."""
+    """Statements of a function, without those that only mark a parameter as used."""
     items = function.body.block_items or []
     return [each for each in items if not (isinstance(each, c_ast.Cast) and isinstance(each.expr, c_ast.ID))]
 
 
 def types(function: c_ast.FuncDef) -> set[str]:
-    """The types that the head of a function names."""
+    """Types named in the declaration of a function."""
     return {word for each in below(function.decl) if isinstance(each, c_ast.IdentifierType) for word in each.names}
 
 
 def reads(node: c_ast.Node) -> Iterator[str]:
-    """Fields of `self` that are read."""
+    """Names of the fields of `self` that a node reads."""
     if isinstance(node, c_ast.Assignment) and node.op == "=":
         field = node.lvalue
         direct = isinstance(field, c_ast.StructRef) and isinstance(field.name, c_ast.ID) and field.name.name == "self"
@@ -237,7 +237,7 @@ TRUE = "static bool hystgen_g(int v) {\n    (void)v;\n    return true;\n}\n"
         (DOUBLE, ["self->last = self->last + x;", "return self->last;"], None),
         (DOUBLE, ["self->last = hystgen_h(self, x);", "return hystgen_g(x);"], None),
         (DOUBLE, ["const int y = hystgen_g(x);", "return x;"], "{ return x; }"),
-        (MOVED, ["const int y = hystgen_g(play);", "return play[0];"], None),  # which moves a play
+        (MOVED, ["const int y = hystgen_g(play);", "return play[0];"], None),  # the call moves a play
     ],
 )  # fmt: skip
 def test_what_is_folded(hook: str, lines: list[str], wanted: str | None) -> None:

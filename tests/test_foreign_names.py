@@ -1,4 +1,4 @@
-"""Emitted C beside other headers: no name in it is a macro of theirs, and it compiles behind them."""
+"""Emitted C next to other headers: none of its names is one of their macros, and it compiles after them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ POSIX_HEADERS = (
 AVR_HEADERS = "avr/io avr/pgmspace avr/interrupt avr/sleep avr/eeprom util/delay util/atomic math stdlib string stdio"
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 
-HEADERS: dict[str, tuple[Sequence[str], str, bool]] = {  # compiler, what it includes, whether CI alone has to have it
+HEADERS: dict[str, tuple[Sequence[str], str, bool]] = {  # compiler, headers to include, whether only CI must have it
     "windows": ((*ZIG, "-target", "x86_64-windows-gnu"), "winsock2 windows objbase math complex", False),
     "avr": (("avr-gcc", *targets.AVR.gcc_flags, "-std=gnu99", "-DF_CPU=16000000", "-O1"), AVR_HEADERS, True),
     "newlib": (("arm-none-eabi-gcc", "-std=gnu11"), C_HEADERS, True),
@@ -57,7 +57,7 @@ def model(name: str) -> Model:
 
 
 def identifiers(text: str, own: str) -> set[str]:
-    """The identifiers of a C text without those that begin with `own` or the prefix of the run time."""
+    """The identifiers of a C text, except those that begin with `own` or the prefix of the run time."""
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
     text = re.sub(r"^#\s*(error|include|pragma)\b.*$", " ", text, flags=re.MULTILINE)
     text = re.sub(r'"[^"\n]*"|\'[^\'\n]*\'', " ", text)
@@ -67,15 +67,15 @@ def identifiers(text: str, own: str) -> set[str]:
 
 
 EFFECTS = ("braked", "lagging", "soft_dashpot", "dilated", "viscous", "rubbed", "heated", "worn", "drifting", "late")
-"""Models that have all effects between them."""
+"""Models that together have all effects."""
 
 
 @functools.cache
 def emitted() -> frozenset[str]:
     """The identifiers of every kind of model, arithmetic, engine and layout."""
     found: set[str] = set()
-    kinds = ("listed", "below", "outside", "two_branches", "mixed", "linear")  # all that templates branch on
-    layouts = ("self-contained", "shared-runtime")  # a single header has the text of the first in one file
+    kinds = ("listed", "below", "outside", "two_branches", "mixed", "linear")  # every case that templates distinguish
+    layouts = ("self-contained", "shared-runtime")  # a single header is the first of these in one file
     for name, arithmetic, engine, layout in itertools.product(kinds, ARITHMETICS, ("corners", "loop"), layouts):
         options = {"operator": "both", "arithmetic": arithmetic, "engine": engine, "layout": layout}
         for text in emitted_files(model(name), **options).values():
@@ -87,7 +87,7 @@ def emitted() -> frozenset[str]:
 
 
 def macros(compiler: Sequence[str], text: str) -> set[str]:
-    """Names of the macros that are defined behind a C text."""
+    """Names of the macros that are defined after a C text."""
     done = subprocess.run(
         [*compiler, "-dM", "-E", "-x", "c", "-"], input=text, capture_output=True, text=True, check=False
     )
@@ -126,14 +126,14 @@ def test_no_emitted_name_is_a_macro_of_these_headers(kind: str) -> None:
 
 
 def test_limits_and_constants_of_stdint_are_not_used() -> None:
-    """C++98 has them only where a macro was defined before <stdint.h> came the first time."""
+    """C++98 has them only if a macro such as __STDC_LIMIT_MACROS is defined before <stdint.h> is first included."""
     assert not {name for name in emitted() if re.fullmatch(r"U?INT\w*_(MAX|MIN|C)|SIZE_MAX", name)}
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("kind", ["list", *HEADERS])
 def test_compiles_behind_other_headers(kind: str, arithmetic: str, tmp_path: Path) -> None:
-    """Behind the headers themselves, and where every name of the list is a macro that compiles to nothing sensible."""
+    """The C compiles after the headers themselves, and where every listed name is a macro of invalid code."""
     if kind == "avr" and arithmetic == "float64":
         pytest.skip("a double of the AVR is a float")
     for layout in ("single-header", "shared-runtime"):

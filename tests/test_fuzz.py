@@ -1,4 +1,4 @@
-"""Any sequence of calls with any bits: no undefined behaviour, answers in range, and the bits of the reference."""
+"""Random calls with random bits: no undefined behaviour, answers in range, and the bits of the reference."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hystgen.verification import compilers
 pytestmark = pytest.mark.thorough
 
 SECONDS = float(os.environ.get("HYSTGEN_FUZZ_SECONDS", "6"))
-"""Of fuzzing a module; `make fuzz` takes longer."""
+"""Duration of the fuzzing of one module; `make fuzz` takes longer."""
 
 needs_clang = pytest.mark.skipif(
     not os.environ.get("CI") and compilers.find("clang") is None, reason="libFuzzer comes with clang"
@@ -72,12 +72,12 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
 def test_fuzzing_finds_nothing_in_models_with_effects(
     name: str, arithmetic: str, engine: str, tmp_path: Path
 ) -> None:
-    """With settings in between, against the reference and in fixed point the other engine."""
+    """Calls include settings; answers are compared with the reference and, in fixed point, with the other engine."""
     assert fuzz(tmp_path, min(SECONDS, 4.0), name, arithmetic, engine) > 300
 
 
 def changed_entry(text: str) -> str:
-    """One threshold by one unit in the last place."""
+    """Change one threshold by one unit in the last place."""
     start = text.index("plain_forward_segment[")
     number = re.compile(r"0\.9f").search(text, start)
     assert number
@@ -86,21 +86,21 @@ def changed_entry(text: str) -> str:
 
 
 def loose_clamp(text: str) -> str:
-    """A committed drive a little beyond the range is accepted."""
+    """Accept a committed drive slightly beyond the range."""
     found = re.sub(r"least > PLAIN_DRIVE_MAX\s*\?", "least > 1.001f * PLAIN_DRIVE_MAX ?", text)
     assert found != text
     return found
 
 
 def beyond_the_range(text: str) -> str:
-    """A drive goes out that is more than what was solved and clamped."""
+    """Return a drive 1 % above the one that was solved and clamped."""
     found = text.replace("return plain_inverse_search(", "return 1.01f * plain_inverse_search(")
     assert found != text
     return found
 
 
 def out_of_bounds(text: str) -> str:
-    """Corners are written behind the end of the list."""
+    """Write corners past the end of the list."""
     slot = "&corner[m->here.depth"
     found = text.replace(f"{slot}]", f"{slot} + PLAIN_N_PLAYS + 1u]")
     assert found != text
@@ -123,7 +123,7 @@ def test_a_defect_is_found(change: Callable[[str], str], said: str, tmp_path: Pa
 
 
 def test_a_crash_before_the_first_call_is_reported(tmp_path: Path) -> None:
-    """By a program that leaves an artifact and writes no call, beside what an earlier run has found."""
+    """The program writes an artifact but no call; the artifact replaces what an earlier run found."""
     binary = tmp_path / "fuzz"
     artifact = "for each; do case $each in -artifact_prefix=*) : > ${each#*=}crash;; esac; done"
     binary.write_text(f"#!/bin/sh\n{artifact}\necho crashed >&2\nexit 1\n")
@@ -139,7 +139,7 @@ def test_a_crash_before_the_first_call_is_reported(tmp_path: Path) -> None:
 
 @needs_clang
 def test_engines_that_differ_are_found(tmp_path: Path) -> None:
-    """In q31 a threshold that is off by half a unit of 2^31 suffices."""
+    """In q31, a threshold that is off by half a code is enough."""
 
     def change(text: str) -> str:
         table = text.index("plain_model_segment[")

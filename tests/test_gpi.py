@@ -1,4 +1,4 @@
-"""Identification with a memoryless part in front: against plants of loops and textbook formulas, and other solvers."""
+"""Identification with a memoryless part in front, compared with plants written as loops and with other solvers."""
 
 from __future__ import annotations
 
@@ -45,18 +45,18 @@ BREAKS = (20.0, 40.0, 60.0, 80.0)
 
 
 def bent(v: Array) -> Array:
-    """A front of straight pieces over 0 .. 100, of mean slope 1, by its points."""
+    """A piecewise linear front over 0 .. 100 with mean slope 1, given by its points."""
     return np.asarray(np.interp(v, [0, 20, 40, 60, 80, 100], np.array([0, 27, 50, 66, 81, 100])))
 
 
 def tanh_front(v: Array, a1: float = 0.018, middle: float = 35.0) -> Array:
-    """An S over 0 .. 100 through both ends of the diagonal."""
+    """An S-shaped front over 0 .. 100 through both ends of the diagonal."""
     low, high = np.tanh(-a1 * middle), np.tanh(a1 * (100.0 - middle))
     return np.asarray(100.0 * (np.tanh(a1 * (v - middle)) - low) / (high - low))
 
 
 def branched(v: Array, lift: float = 3.0) -> Array:
-    """The S while the drive rises, another one above it while it falls; the last one where it stands still."""
+    """The S-shaped front while the drive rises, a higher one while it falls; a constant drive keeps the last one."""
     w, rising = np.empty_like(v), True
     for k, x in enumerate(v):
         if k and x != v[k - 1]:
@@ -76,13 +76,13 @@ def held_out(fit: Fit, front: Callable[[Array], Array], seed: int = 77) -> float
     v, y = plant(front, seed, 0.0)
     known = fit.settled(record(v, y))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it may leave the fitted range by a little
+        warnings.simplefilter("ignore")  # the record may slightly exceed the fitted range
         error = (y - fit.predict(record(v, y)))[known:]
     return float(np.std(error))
 
 
 def pieces(fit: Fit) -> Array:
-    """Slopes of the dead-zone sum between 0 and 100, and the weights times the mean of them, for any scale of it."""
+    """Slopes of the five pieces of the dead-zone sum between 0 and 100."""
     (stage,) = fit.parameters.model.memoryless
     v = np.array([10.0, 30.0, 50.0, 70.0, 90.0])
     value = np.zeros((2, len(v)))
@@ -107,7 +107,7 @@ class TestDeadZone:
     def test_same_model_with_noise(self) -> None:
         v, y = plant(bent, 3)
         fit = hystgen.identify(record(v, y), model="gpi-deadzone", thresholds=THRESHOLDS, breaks=BREAKS)
-        # noise and error together at most 1.1 times the noise
+        # noise and model error together are at most 1.1 times the noise
         assert held_out(fit, bent) <= np.sqrt(1.1**2 - 1.0) * NOISE
 
     def test_everything_chosen(self) -> None:
@@ -168,9 +168,9 @@ class TestTanh:
         assert np.all(down >= up)
 
     def test_held_out_records_choose_between_one_branch_and_two(self) -> None:
-        """Plays behind a bent sensor: two branches follow its single loop more closely; smaller loops show them wrong.
+        """Two branches fit the single loop of plays behind a curved sensor better; smaller loops show them to be wrong.
 
-        Without the smaller loops nothing tells, and two branches are taken.
+        Without the smaller loops nothing speaks against two branches, and they are chosen.
         """
 
         def swings(fade: float, seed: int) -> tuple[Array, Array]:
@@ -190,7 +190,7 @@ class TestTanh:
         assert errors[1] < 0.75 * errors[0]
 
     def test_branches_never_cross(self) -> None:
-        """A plant whose falling branch lies below the rising one has no such model: what is fitted is invertible."""
+        """A plant whose falling branch lies below the rising one has no such model; the fitted one is invertible."""
         v, y = plant(lambda x: branched(x, -3.0), 3)
         fit = hystgen.identify(record(v, y), model="gpi-tanh", thresholds=THRESHOLDS)
         (stage,) = fit.parameters.model.memoryless
@@ -214,10 +214,10 @@ class TestTanh:
 @pytest.mark.parametrize(("volts", "metres"), [(436.9, 1e-6), (1e6, 1e-9), (1e-6, 1e6)])
 @pytest.mark.parametrize(("front", "kind"), [(bent, "gpi-deadzone"), (branched, "gpi-tanh")])
 def test_units_do_not_matter(front: Callable[[Array], Array], kind: str, volts: float, metres: float) -> None:
-    """A drive in codes of a converter and an output in metres are as good as V and um.
+    """Drives in converter codes and outputs in metres are fitted as well as V and um.
 
-    The sum of squares is flat about its minimum, so that an error tells whether it was found: a search ends where the
-    last step lowered it by less than a noise that is 0.1 % of the output can show.
+    The sum of squares is flat around its minimum, so errors are compared, not parameters: a search ends once a step
+    lowers the sum by less than noise of 0.1 % of the output can reveal.
     """
     v, y = plant(front, 3)
     plain, other = (hystgen.identify(r, model=kind) for r in (record(v, y), record(v * volts, y * metres)))
@@ -229,12 +229,12 @@ KERNELS = (
     {"OPENBLAS_CORETYPE": "Haswell"},
     {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4"},
 )
-"""Processors of different years, as the linear algebra library and numpy choose their loops by."""
+"""Environments in which OpenBLAS and numpy choose the kernels of processors from different years."""
 
 
 @pytest.mark.thorough
 def test_the_same_bytes_on_another_processor(tmp_path: Path) -> None:
-    """Searches with a front, and for effects, end in the same numbers although the last bits of sums differ."""
+    """Searches for a front and for effects end in the same numbers although the last bits of sums differ."""
     if platform.machine() not in ("x86_64", "AMD64"):
         (pytest.fail if os.environ.get("CI") else pytest.skip)("the kernels are those of x86 processors")
     v, y = plant(branched, 3)
@@ -283,7 +283,7 @@ class TestAuto:
 
 @pytest.mark.data
 def test_dead_zones_of_a_150_v_actuator(measured: Path, tmp_path: Path, run: Run) -> None:
-    """Fitted to two periods of a sine after a step that rings, compared with the later ones."""
+    """Fitted to two periods of a sine after a step that rings, and compared with the later periods."""
     source = measured / "piezo_150v_step_then_1hz.csv"
     data = part_of_file(source, tmp_path / "first.csv", 17500, 27500)
     held = part_of_file(source, tmp_path / "later.csv", 27500)
@@ -304,7 +304,7 @@ def test_dead_zones_of_a_150_v_actuator(measured: Path, tmp_path: Path, run: Run
 class TestSolvers:
     @pytest.mark.parametrize("seed", range(20))
     def test_least_squares_under_inequalities(self, seed: int) -> None:
-        """Against sequential quadratic programming."""
+        """Solutions agree with those of sequential quadratic programming."""
         rng = np.random.default_rng(seed)
         k, m = int(rng.integers(2, 8)), int(rng.integers(1, 10))
         matrix, target = rng.normal(size=(3 * k, k)), rng.normal(size=3 * k)
@@ -329,7 +329,7 @@ class TestSolvers:
 
     @pytest.mark.parametrize("height", [1e6, 1e7, 1e8, 1e9])
     def test_inequalities_that_meet_far_away(self, height: float) -> None:
-        """Two lines that meet at (0, height): no more is lost than rounding takes of the angle between them."""
+        """For two lines that meet at (0, height), the error stays within what rounding their angle causes."""
         lines = np.array([[1.0, 1.0 / height], [-1.0, 1.0 / height]])
         x, y = pi.least_squares(np.eye(2), np.zeros(2), lines, np.ones(2))
         eps = np.finfo(np.float64).eps
@@ -416,7 +416,7 @@ class TestIntervals:
     TRIALS = 200
 
     def covered(self, colour: float) -> tuple[Array, float]:
-        """In which share of trials the intervals hold the true weights, and the true width of the loop."""
+        """Share of trials in which the intervals contain each true weight, and the share for the true loop width."""
         truth, r = np.array(WEIGHTS), np.array(THRESHOLDS)
         width = 2.0 * (truth @ r) / truth.sum()
         hits, wide = np.zeros(len(truth)), 0
@@ -437,7 +437,7 @@ class TestIntervals:
         weights, width = self.covered(colour)
         assert 0.90 <= np.mean(weights) <= 0.99
         assert 0.90 <= width <= 0.99
-        assert np.min(weights) >= (0.86 if colour else 0.90)  # of 200 trials: two standard deviations below 0.9
+        assert np.min(weights) >= (0.86 if colour else 0.90)  # two standard deviations of 200 trials below 0.9
         assert colour or np.max(weights) <= 0.99
 
     def test_the_held_out_error(self) -> None:
@@ -459,7 +459,7 @@ class TestIntervals:
 @pytest.mark.parametrize("front", [np.asarray, bent])
 @pytest.mark.thorough
 def test_an_unknown_history_costs_little(front: Callable[[Array], Array]) -> None:
-    """At most 10 % in held-out error, over twenty plants."""
+    """An unknown history raises the mean held-out error over twenty plants by at most 10 %."""
     kind = "pi" if front is np.asarray else "gpi-deadzone"
     known, unknown = [], []
     for seed in range(20):
@@ -469,18 +469,18 @@ def test_an_unknown_history_costs_little(front: Callable[[Array], Array]) -> Non
             breaks = BREAKS if kind == "gpi-deadzone" else None
             fit = hystgen.identify(record(v, y), model=kind, thresholds=THRESHOLDS, breaks=breaks, history=history)
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # it may leave the fitted range by a little
-                # judged alike: the memory of the held-out record is known
+                warnings.simplefilter("ignore")  # the record may slightly exceed the fitted range
+                # the memory of the held-out record is known for both
                 predicted = fit.predict(record(w, z), history=())
             errors.append(float(np.std(z - predicted)))
     assert np.mean(unknown) <= 1.1 * np.mean(known)
 
 
 class TestLoadingCurve:
-    """From `phi`, the output of a virgin actuator on its first way up."""
+    """Identification from `phi`, the output of a virgin actuator on its first rise."""
 
     def curve(self, x: Array) -> Array:
-        """Density 0.02 exp(-r/20) and p_0 = 0.5, integrated twice by hand."""
+        """Loading curve of the density 0.02 exp(-r/20) and p_0 = 0.5, integrated twice by hand."""
         return np.asarray(0.5 * x + 0.4 * (x + 20.0 * (np.exp(-x / 20.0) - 1.0)))
 
     def test_the_model_of_a_density(self, tmp_path: Path, run: Run) -> None:
@@ -494,7 +494,7 @@ class TestLoadingCurve:
         assert part.get("initial_state", 0.0) == 0.0
         x = np.linspace(0.0, 95.0, 200)
         np.testing.assert_allclose(np.maximum(x[:, None] - r, 0.0) @ p, self.curve(x), rtol=0, atol=0.1)
-        # the loop of the density, by a fine sum, which the curve alone tells
+        # the loop that the curve alone determines, here from a fine sum over the density
         u = 45.0 * np.sin(np.linspace(0.0, 4.0 * np.pi, 400))
         fine = (np.arange(400) + 0.5) * 0.25
         plant = brute_output(u, [0.0, *fine], [0.5, *(0.02 * np.exp(-fine / 20.0) * 0.25)], 0.0)

@@ -1,4 +1,4 @@
-"""The order of the rooms of `hystgen`: what imports what, at any level and for types alone; and its public names."""
+"""The order of the rooms of `hystgen`, of which late and type-only imports are part; its public names; its size."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def modules(package: Path) -> dict[str, Path]:
 
 
 def imports(name: str, path: Path, known: Mapping[str, Path]) -> Iterator[str]:
-    """Modules of the package that a module imports: on top, inside functions, and for types alone."""
+    """Modules of the package that a module imports at its top, inside functions, or for types alone."""
     top = name.split(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -79,7 +79,7 @@ def imports(name: str, path: Path, known: Mapping[str, Path]) -> Iterator[str]:
 
 @functools.cache
 def graph() -> dict[str, frozenset[str]]:
-    """Of every module of the package those that it imports."""
+    """Modules that each module of the package imports."""
     known = modules(PACKAGE)
     return {name: frozenset(imports(name, path, known)) - {name} for name, path in known.items()}
 
@@ -90,7 +90,7 @@ def room(module: str) -> str:
 
 
 def against(arrows: Mapping[str, frozenset[str]], rooms: Sequence[str]) -> set[tuple[str, str]]:
-    """Imports from a room further down."""
+    """Imports from a room further down the list."""
     return {
         (name, other)
         for name, others in arrows.items()
@@ -100,8 +100,8 @@ def against(arrows: Mapping[str, frozenset[str]], rooms: Sequence[str]) -> set[t
 
 
 def circles(arrows: Mapping[str, frozenset[str]]) -> list[list[str]]:
-    """Modules in circles, and between two of them, in one list: what is left when modules that import none of the rest,
-    or that none of the rest imports, are taken away again and again."""
+    """Modules in cycles of imports, or between two cycles, in one list: those left after repeatedly removing modules
+    that import none of the rest and modules that none of the rest imports."""
     left = dict(arrows)
     while True:
         ends = {name for name, others in left.items() if not others & left.keys()}
@@ -123,12 +123,12 @@ def test_imports_follow_the_order_of_the_rooms() -> None:
 
 
 def test_there_is_no_circle() -> None:
-    """Not even within a room."""
+    """No cycle of imports exists, not even within a room."""
     assert circles(graph()) == []
 
 
 def test_what_the_test_of_the_order_sees(tmp_path: Path) -> None:
-    """Arrows and circles in an invented package, whichever way they are written."""
+    """The test of the order finds wrong imports and cycles in an invented package, however they are written."""
     package = tmp_path / "made"
     for path, text in {
         "__init__.py": "",
@@ -152,7 +152,7 @@ def test_what_the_test_of_the_order_sees(tmp_path: Path) -> None:
 
 
 def test_effects_are_folders() -> None:
-    """A folder is in the catalogue, and a catalogue entry has a model."""
+    """Every folder of an effect is in the catalogue, and every catalogue entry has a model."""
     from hystgen.effects import CATALOGUE, shapes
 
     folders = {path.parent.name for path in (PACKAGE / "effects").glob("*/model.py")}
@@ -168,7 +168,7 @@ def public() -> list[str]:
 
 
 def test_public_names_are_those_that_type_checkers_see() -> None:
-    """What `hystgen/__init__.py` imports for types is what it gives at run time."""
+    """The names that `hystgen/__init__.py` imports for type checkers are the objects that it gives at run time."""
     (block,) = (
         node
         for node in ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8")).body
@@ -196,7 +196,7 @@ def test_dir_and_help_list_the_public_names() -> None:
 
 @pytest.mark.parametrize("name", ["emit", "verify", "identify", "diagnose", "plan", "differences"])
 def test_signatures_are_real(name: str) -> None:
-    """Every option stands in the signature with its default, and none is hidden in `**options`."""
+    """Every option is in the signature with its default, and none is hidden in `**options`."""
     parameters = inspect.signature(getattr(hystgen, name)).parameters.values()
     assert len(parameters) > 3
     assert all(each.kind is not each.VAR_KEYWORD for each in parameters)
@@ -218,13 +218,13 @@ def test_the_package_itself_imports_nothing() -> None:
     ("walk", "most"),
     [
         ("a recording's column v to weights", 29),
-        ("a weight to its digit in float32 C", 28),  # 3 of them explain the C, one declares memory by name
-        ("a sample through the bit reference", 6),  # one of them runs the calls of every engine
-        ("a recording to a named effect", 68),  # 8 of them put the inverse in front of the plain model
+        ("a weight to its digit in float32 C", 28),  # 3 of these files explain the C, one declares memory by name
+        ("a sample through the bit reference", 6),  # one of these files runs the calls of every engine
+        ("a recording to a named effect", 68),  # 8 of these files put the inverse in front of the plain model
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:
-    """Files of the package that a number passes through on its way: a reader has to follow it."""
+    """A reader has to follow a number through few files of the package."""
     plain = {**os.environ, "NUMBA_DISABLE_JIT": str(int("bit reference" in walk))}
     script = Path(__file__).parents[1] / "benchmarks" / "walks.py"
     run = subprocess.run([sys.executable, script, "--one", walk], capture_output=True, text=True, check=True, env=plain)
@@ -248,21 +248,21 @@ BOUNDS = {
     "files of C": (99, 120),
     "lines of C": (7_204, 5_000),
 }
-"""Largest number of each today, and the target. A change that gets below the first lowers it; nothing raises it."""
+"""Bound of each count today, and the target. A change that gets below the bound lowers it; nothing raises it."""
 
 
 def texts(folder: Path, endings: Sequence[str]) -> dict[Path, str]:
-    """Files of a folder with these endings, and their text."""
+    """The files of a folder with these endings, and their text."""
     return {path: path.read_text(encoding="utf-8") for end in endings for path in sorted(folder.rglob(f"*{end}"))}
 
 
 def lines(files: Mapping[Path, str], pattern: str) -> int:
-    """Lines in which a pattern occurs."""
+    """Number of lines in which a pattern occurs."""
     return sum(bool(re.search(pattern, line)) for text in files.values() for line in text.splitlines())
 
 
 def slots(files: Mapping[Path, str]) -> int:
-    """Assignments of consecutive numbers to a tuple of constants: `A, B = range(2)`, or the numbers themselves."""
+    """Number of tuples of constants assigned consecutive numbers: `A, B = range(2)`, or the numbers themselves."""
     found = 0
     for text in files.values():
         for node in ast.walk(ast.parse(text)):
@@ -279,7 +279,7 @@ def slots(files: Mapping[Path, str]) -> int:
 
 
 def named_outside(files: Mapping[Path, str], effects: Path, names: Sequence[str]) -> set[Path]:
-    """Files that import from the folder of an effect, or test for its name, and lie in another one."""
+    """Files outside an effect's folder that import from it or test for the effect's name."""
     return {
         path
         for path, text in files.items()
@@ -290,7 +290,7 @@ def named_outside(files: Mapping[Path, str], effects: Path, names: Sequence[str]
 
 
 def several(files: Mapping[Path, str]) -> set[str]:
-    """Names of classes that more than one file has at its top level."""
+    """Names of classes that are defined at the top level of more than one file."""
     names = [
         node.name for text in files.values() for node in ast.parse(text).body if isinstance(node, ast.ClassDef)
     ]
@@ -298,7 +298,7 @@ def several(files: Mapping[Path, str]) -> set[str]:
 
 
 def counted() -> dict[str, int]:
-    """What `BOUNDS` bounds, of this package."""
+    """The counts of this package that `BOUNDS` limits."""
     from hystgen.effects import CATALOGUE
 
     python, c = texts(PACKAGE, [".py"]), texts(PACKAGE, [".c", ".h"]) | texts(C_RUNTIME, [".c", ".h"])
@@ -323,7 +323,7 @@ def test_what_grows_stays_within_its_bound() -> None:
 
 
 def test_what_the_counts_see(tmp_path: Path) -> None:
-    """Of an invented package."""
+    """The counts of an invented package are right."""
     effects = tmp_path / "effects"
     for path, text in {
         "effects/creep/model.py": 'name = "creep"\n',

@@ -1,4 +1,4 @@
-"""The plants of `hystgen.plants`: against other integrators, brute force, and what their literature says of them."""
+"""The plants of `hystgen.plants` agree with other integrators, with brute force, and with their literature."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ pytestmark = pytest.mark.thorough
 
 Array = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
-U = EPS / 2.0  # what one rounding may add, as a share of its result
+U = EPS / 2.0  # largest error of one rounding, as a share of its result
 
 CORNERS = [0.0, 3.0, -2.0, 1.5, -0.5, 1.0, 0.25, 2.5, -4.0, 4.0, 0.0, 3.5, 3.5, 1.0, -1.0]
 
 
 def path(corners: list[float] = CORNERS, samples: int = 25) -> Array:
-    """Straight between the corners, each of which is a sample."""
+    """Samples on straight lines between the corners, which are samples themselves."""
     return np.concatenate([np.linspace(a, b, samples, endpoint=False) for a, b in pairwise(corners)] + [corners[-1:]])
 
 
 def over_input(
     slope: Callable[[float, float, float], float], v: Array, start: float, atol: float
 ) -> tuple[Array, float]:
-    """State at the samples by scipy, one move between samples at a time; slope(v, y, direction).
+    """State at the samples by scipy, integrated move by move; slope(v, y, direction).
 
-    And the sum of what its steps were allowed, which is the error at the end where the moves bring states together.
+    Also the sum of the errors allowed to its steps: the error at the end where moves bring states together.
     """
     states, y, last, allowed = [], start, 0.0, 0.0
     for x in v:
@@ -65,14 +65,14 @@ def over_input(
 
 @pytest.fixture
 def allowed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """What the steps of LSODA up to each sample are allowed, of all that a plant integrates from here on."""
+    """Error that the steps of LSODA up to each sample are allowed, for all that a plant integrates from here on."""
     found: list[float] = []
     odeint = scipy.integrate.odeint
 
     def counted(slope: Any, start: float, v: Array, *, rtol: float, atol: float, **kwargs: Any) -> Any:
         assert rtol <= 1e-11
         y, told = odeint(slope, start, v, rtol=rtol, atol=atol, **kwargs)
-        taken = np.where(v[1:] == v[0], 0, told["nst"])  # not set before the first step
+        taken = np.where(v[1:] == v[0], 0, told["nst"])  # `nst` is not set before the first step
         steps, size = np.diff(taken, prepend=0), np.max(np.abs([y[:-1, 0], y[1:, 0]]), axis=0)
         found.extend((steps * (rtol * size + atol)).tolist())
         return y, told
@@ -82,12 +82,12 @@ def allowed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def added_up(added: float | Array, kept: Array) -> Array:
-    """Error after every sample, each of which keeps a share of what there was before and adds its own."""
+    """Error after every sample: each keeps a share of the error before it and adds its own."""
     steps = zip(kept, np.broadcast_to(added, len(kept)), strict=True)
     return np.array([*accumulate(steps, lambda error, step: step[0] * error + step[1], initial=0.0)][1:])
 
 
-# -- all of them -------------------------------------------------------------------------------------------------------
+# -- all plants --------------------------------------------------------------------------------------------------------
 
 SURFACE = EverettTable.of_density(np.linspace(-5.0, 5.0, 41).tolist(), lambda a, b: np.exp(b - a - (a + b) ** 2 / 20))
 EVERY: dict[str, Any] = {
@@ -99,7 +99,7 @@ EVERY: dict[str, Any] = {
     "MaxwellSlip": plants.MaxwellSlip([1.0, 2.0], [0.5, 3.0], 0.5),
     "Preisach": plants.Preisach(SURFACE, -5.0, 5.0),
 }
-# Every closed form, and numbers whose sums are rounded
+# All closed forms, and parameters whose sums are rounded
 REPEATED: dict[str, Any] = {
     **EVERY,
     "BoucWen, n = 1.7": plants.BoucWen(1.5, 2.0, D=1.3, beta=0.6, gamma=0.3, n=1.7),
@@ -119,19 +119,19 @@ def test_the_registry_holds_every_plant() -> None:
 
 
 def bouc_wen_roundings(plant: plants.BoucWen, v: Array) -> Array:
-    """Error of the closed form of n = 1, in output: 10 roundings of numbers up to the bound of z take a state back to
-    0 and 10 take it on, where it keeps the exponential of its way."""
+    """Rounding error of the closed form for n = 1, in output units: 10 roundings of numbers up to the bound of z take a
+    state back to 0 and 10 take it on; a move on from 0 shrinks earlier errors by the exponential of its length."""
     z, way = plant.hysteretic(v), np.diff(v, prepend=0.0)
     on = np.sign(way) * np.concatenate([[plant.start], z[:-1]]) >= 0.0
     kept = np.where(on, np.exp(-(plant.beta + plant.gamma) * np.abs(way) / plant.D), 1.0)
     scale = abs(1.0 - plant.alpha) * plant.k * plant.D
-    # and the sum of two products of two and three factors
+    # plus the sum of two products of two and three factors
     return scale * added_up(20.0 * U * plant.bound, kept) + 4.0 * U * (plant.alpha * plant.k * np.abs(v) + scale)
 
 
 def dahl_roundings(plant: plants.Dahl, v: Array) -> Array:
-    """Error of the closed form of exponent 1: of 1 - F / F_c <= 2 after a division and a difference, its product with
-    an exponential, whose argument of three roundings counts for at most 1 / e of its size, and F from it."""
+    """Rounding error of the closed form for exponent 1: of 1 - F / F_c <= 2 from a division and a difference, of its
+    product with an exponential, whose argument has three roundings that count for at most 1 / e, and of F from it."""
     per_sample = (1.0 + 2.0 + 2.0 * (3.0 / math.e + 2.0 + 1.0) + 1.0 + 1.0) * U * plant.limit
     return added_up(per_sample, np.exp(-plant.sigma * np.abs(np.diff(v, prepend=0.0)) / plant.limit))
 
@@ -140,8 +140,8 @@ ROUNDINGS: dict[str, Callable[[Any, Array], Array]] = {"BoucWen": bouc_wen_round
 
 
 def spread(plant: object) -> float:
-    """How far states can move apart at most: not at all where the slope falls with the state in the direction of the
-    move. That of M_irr does, and M moves by (1 - c) / (1 - c alpha dM_an/dH_e) of it, dM_an/dH_e in (0, Ms / 3 a]."""
+    """Largest factor by which moves spread states: 1 where the slope falls with the state in the direction of the move.
+    That of M_irr does, and M moves by (1 - c) / (1 - c alpha dM_an/dH_e) of it, with dM_an/dH_e in (0, Ms / 3 a]."""
     if not isinstance(plant, plants.JilesAtherton):
         return 1.0
     return 1.0 / (1.0 - plant.c * plant.alpha * plant.Ms / (3.0 * plant.a))
@@ -149,8 +149,8 @@ def spread(plant: object) -> float:
 
 @pytest.mark.parametrize("name", EVERY)
 def test_only_the_corners_of_the_input_matter(name: str, allowed: list[float]) -> None:
-    """Rate independence: any sampling between the same corners gives the same output at them; in every bit where that
-    is extrema (Preisach), clipping (KP) or sums of such numbers as these (Maxwell-slip)."""
+    """Rate independence: any sampling between the same corners gives the same output at them; in every bit for plants
+    of extrema (Preisach), of clipping (KP) or of sums that are exact for these numbers (Maxwell-slip)."""
     plant, v = EVERY[name], path(samples=32)
     coarse, fine = plant.simulate(CORNERS), plant.simulate(v)[::32]
     apart = np.full(len(CORNERS), sum(allowed) * spread(plant))
@@ -237,7 +237,7 @@ BOUC_WEN = [(1.0, 0.5, 0.5), (1.0, 0.6, -0.3), (2.0, 0.6, 0.3), (2.0, 0.5, 0.5),
 def test_bouc_wen_is_its_equation_in_time(
     n: float, beta: float, gamma: float, pace: float, allowed: list[float]
 ) -> None:
-    """`D z' = A v' - beta |v'| |z|^(n-1) z - gamma v' |z|^n` (Wen 1976), by scipy, at two paces that vary."""
+    """`D z' = A v' - beta |v'| |z|^(n-1) z - gamma v' |z|^n` (Wen 1976), integrated by scipy at two varying paces."""
     amplitude, distance = 0.9, 1.3
     plant = plants.BoucWen(0.3, 2.0, D=distance, A=amplitude, beta=beta, gamma=gamma, n=n, start=0.2)
     corners = [0.0, 3.0, -2.0, 1.5, -0.5, 2.0]
@@ -254,7 +254,7 @@ def test_bouc_wen_is_its_equation_in_time(
 
         found = solve_ivp(slope, (0.0, 1.0 / pace), [z], method="DOP853", rtol=1e-11, atol=1e-13)
         by_scipy.append(len(found.t) * (1e-11 * float(np.max(np.abs(found.y))) + 1e-13))
-        # of a difference that it begins with a move keeps the ratio of the slopes at its end and begin
+        # a move scales an initial difference by the ratio of the slopes at its end and its begin
         end = float(found.y[0, -1])
         kept.append(slope(1.0, np.array([end]))[0] / slope(1.0, np.array([z]))[0])
         z = end
@@ -271,14 +271,14 @@ def test_bouc_wen_is_its_equation_in_time(
 def test_bouc_wen_stays_in_its_bound_and_ends_in_its_limit_cycle(
     n: float, beta: float, gamma: float, allowed: list[float]
 ) -> None:
-    """|z| <= (A / (beta + gamma))^(1/n), and under a periodic input z ends between -z_m and z_m, where the way from one
-    to the other is as long as the input's (Ikhouane and Rodellar 2007, chapter 3)."""
+    """|z| <= (A / (beta + gamma))^(1/n), and a periodic input makes z cycle between -z_m and z_m, which lie one swing
+    of the input apart (Ikhouane and Rodellar 2007, chapter 3)."""
     amplitude, distance, swing = 1.1, 0.8, 1.9
     plant = plants.BoucWen(0.5, 1.0, D=distance, A=amplitude, beta=beta, gamma=gamma, n=n)
     bound = (amplitude / (beta + gamma)) ** (1.0 / n)
     assert plant.bound == bound
     far = plant.hysteretic([100.0, -100.0])
-    # 1 - x^n >= 1 - x: what is left falls by A / bound of it at least, over a way in units of D
+    # 1 - x^n >= 1 - x: the gap to the bound decays at least as fast as exp(-(A / bound) (v / D))
     left = bound * math.exp(-amplitude / bound * 100.0 / distance)
     assert np.all(np.abs(np.abs(far) - bound) <= left + sum(allowed) + 8.0 * U * bound)
     assert np.max(np.abs(plant.hysteretic(path(samples=200)))) <= bound * (1.0 + 4.0 * EPS)
@@ -294,7 +294,7 @@ def test_bouc_wen_stays_in_its_bound_and_ends_in_its_limit_cycle(
     begin, end = amplitude - (gamma - beta) * limit**n, amplitude - (gamma + beta) * limit**n  # slopes of a move
     allowed.clear()
     z = plant.hysteretic([5.0, 0.3, *[0.3 + swing, 0.3] * 60])
-    # a move keeps end / begin of a difference; brentq was asked for 1e-15 and its least rtol, 4 EPS
+    # a move scales a difference by end / begin; brentq's tolerances are 1e-15 and its least rtol, 4 EPS
     kept = end / begin
     assert kept**120 * 2.0 * bound < U
     own = max(allowed, default=20.0 * U * bound)
@@ -304,7 +304,7 @@ def test_bouc_wen_stays_in_its_bound_and_ends_in_its_limit_cycle(
 
 @pytest.mark.parametrize("n", [30.0, 2000.0])
 def test_bouc_wen_of_a_large_exponent(n: float) -> None:
-    """A rise from rest takes z to `v = int_0^z dx / (1 - x^n)`; long moves end at the bound, here 1."""
+    """A rise from rest ends at the z with `v = int_0^z dx / (1 - x^n)`; long moves end at the bound, here 1."""
     plant = plants.BoucWen(0.5, 1.0, n=n)
     for v in (0.5, 0.95):
         (z,) = plant.hysteretic([v])
@@ -316,7 +316,7 @@ def test_bouc_wen_of_a_large_exponent(n: float) -> None:
 
 
 def test_dahl_is_an_exponential_for_exponent_one() -> None:
-    """With 30 digits, so that what is left are the roundings of the plant."""
+    """The exponential is computed with 30 digits, so that only the rounding of the plant remains."""
     plant, v = plants.Dahl(2.0, 1.5, 1.0, 0.3), path()
     force, last, expected = mpmath.mpf(0.3), 0.0, []
     with mpmath.workdps(30):
@@ -330,7 +330,7 @@ def test_dahl_is_an_exponential_for_exponent_one() -> None:
 
 
 def test_dahl_is_the_stop_operator_for_exponent_zero() -> None:
-    """Elastic up to the limit, then sliding: `F_k = clip(F_(k-1) + sigma dv, -F_c, F_c)`; in fractions."""
+    """Elastic up to the limit, then sliding: `F_k = clip(F_(k-1) + sigma dv, -F_c, F_c)`, computed in fractions."""
     v = path()
     force, last, exact = Fraction(0), Fraction(0), []
     for x in map(Fraction, v.tolist()):
@@ -339,8 +339,8 @@ def test_dahl_is_the_stop_operator_for_exponent_zero() -> None:
         exact.append(force)
     found = [Fraction(x) for x in plants.Dahl(2.0, 1.5, 0.0).simulate(v).tolist()]
     off = np.array([float(abs(a - b)) for a, b in zip(found, exact, strict=True)])
-    # in units of the limit a sample rounds F once, 1 - F and the sum up to 2, the way thrice and F twice;
-    # sliding keeps nothing of it
+    # in units of the limit, a sample rounds F once, 1 - F and the sum, both up to 2, the move thrice and F twice;
+    # sliding discards earlier errors
     way = 2.0 / 1.5 * np.max(np.abs(np.diff(v)))
     kept = np.where([abs(x) == Fraction(3, 2) for x in exact], 0.0, 1.0)
     assert np.all(off <= added_up((1.0 + 2.0 + 2.0 + 3.0 * way + 2.0) * U * 1.5, kept))
@@ -348,7 +348,7 @@ def test_dahl_is_the_stop_operator_for_exponent_zero() -> None:
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0, 3.0])
 def test_dahl_is_a_duhem_model(exponent: float, allowed: list[float]) -> None:
-    """The closed form against its equation, by the general integrator and by scipy."""
+    """The closed form agrees with its equation as solved by the general integrator and by scipy."""
     sigma, limit = 2.0, 1.5
 
     def slope(force: float, sign: float) -> float:
@@ -357,7 +357,7 @@ def test_dahl_is_a_duhem_model(exponent: float, allowed: list[float]) -> None:
     v = path(samples=12)
     exact = plants.Dahl(sigma, limit, exponent).simulate(v)
     duhem = plants.Duhem(lambda _, f: slope(f, 1.0), lambda _, f: slope(f, -1.0), scale=limit)
-    # moves bring forces together, so that what the steps are allowed adds up; roundings are nothing beside it
+    # moves bring forces together, so the error is at most the sum allowed to the steps; rounding is negligible
     found = duhem.simulate(v)
     np.testing.assert_allclose(found, exact, rtol=0, atol=sum(allowed))
     by_scipy, error = over_input(lambda _, f, s: slope(f, s), v, 0.0, 1e-13)
@@ -376,12 +376,12 @@ def test_duhem_is_its_equation(allowed: list[float]) -> None:
 
     expected, error = over_input(lambda x, y, s: rising(x, y) if s > 0 else falling(x, y), v, 0.4, 1e-12)
     found = plants.Duhem(rising, falling, 0.4).simulate(v)
-    # moves bring outputs together
+    # moves bring outputs together, so errors do not grow
     np.testing.assert_allclose(found, expected, rtol=0, atol=sum(allowed) + error)
 
 
 def test_coleman_and_hodgdon_have_their_closed_form(allowed: list[float]) -> None:
-    """With f = b v and g = c, `y = b v -/+ (b - c) / alpha` is what every long rise (-) or fall (+) ends in."""
+    """With f = b v and g = c, every long rise (-) or fall (+) ends in `y = b v -/+ (b - c) / alpha`."""
     alpha, b, c = 0.8, 1.5, 0.6
     plant = plants.Duhem.coleman_hodgdon(alpha, lambda v: b * v, lambda _: c)
     y, last, v, expected = 0.0, 0.0, path(), []
@@ -397,14 +397,14 @@ def test_coleman_and_hodgdon_have_their_closed_form(allowed: list[float]) -> Non
 
 @pytest.mark.parametrize("apart", [1e-12, 1e-15, -1e-12, -1e-15])
 def test_dahl_goes_over_into_the_exponential(apart: float) -> None:
-    """dF / d(exponent) is below 1 along these moves, so what is left is `apart` and the rounding."""
+    """dF / d(exponent) is below 1 along these moves, so forces differ by `apart` and rounding only."""
     v = [0.3, -0.4, 1.0]
     near, at = (plants.Dahl(1.0, 1.0, exponent).simulate(v) for exponent in (1.0 + apart, 1.0))
     np.testing.assert_allclose(near, at, rtol=0, atol=abs(apart) + 40.0 * U)
 
 
 def test_dahl_of_a_large_exponent() -> None:
-    """Beyond what its powers can be in double precision, with mpmath instead."""
+    """Powers leave the range of double precision here, so the expected forces come from mpmath."""
     import mpmath
 
     exponent, v, force, expected = 2000, [0.3, -0.4, 1.0], mpmath.mpf(0), []
@@ -417,7 +417,7 @@ def test_dahl_of_a_large_exponent() -> None:
 
 
 def test_duhem_asks_for_its_slope_along_the_input_alone(allowed: list[float]) -> None:
-    """The roots exist there and nowhere else."""
+    """The square roots in its slopes are real only between the inputs."""
     plant = plants.Duhem(lambda v, y: math.sqrt(1.0 - v) - y, lambda v, y: math.sqrt(v + 1.0) + y)
     found = plant.simulate([0.4, 1.0, 1.0, 0.2, -1.0, -1.0])[[1, 4]]
     turns = np.array([1.0, -1.0])
@@ -426,7 +426,7 @@ def test_duhem_asks_for_its_slope_along_the_input_alone(allowed: list[float]) ->
 
 
 def test_coleman_and_hodgdon_of_a_small_output() -> None:
-    """In other units of the output, given as its scale, every digit of the tolerance is the same."""
+    """With the output in other units, which `scale` states, every digit of the output is the same."""
     size = 2.0**-30
     whole, small = (
         plants.Duhem.coleman_hodgdon(0.8, lambda v, s=s: s * 1.5 * v, lambda _, s=s: s * 0.6, scale=s)
@@ -448,8 +448,8 @@ def test_an_integration_that_fails_says_so(name: str, monkeypatch: pytest.Monkey
 
 
 def test_maxwell_slip_is_every_element_for_itself_and_a_play_sum() -> None:
-    """Elements as blocks dragged by springs; two share a yield way, so that the play sum has one play fewer. All are
-    sums of powers of two, which no operation rounds."""
+    """Elements are blocks dragged by springs; two yield after the same distance, so the play sum has one play fewer.
+    All numbers are sums of powers of two, which no operation rounds."""
     stiffnesses, slips, spring = [1.0, 0.5, 2.0, 0.25], [0.375, 0.9375, 3.75, 0.625], 0.3125
     v = path(samples=64)
     blocks, expected = np.zeros(4), []
@@ -473,7 +473,7 @@ def test_maxwell_slip_is_every_element_for_itself_and_a_play_sum() -> None:
 
 
 def relays(v: Array, alpha: Array, beta: Array, weights: Array) -> Array:
-    """Relays one by one, all down before the first sample."""
+    """Sum of relays, computed one by one; all are down before the first sample."""
     up = np.zeros(len(alpha), dtype=bool)
     found = []
     for x in v:
@@ -484,8 +484,8 @@ def relays(v: Array, alpha: Array, beta: Array, weights: Array) -> Array:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_preisach_is_a_sum_of_relays(seed: int) -> None:
-    """Exactly, for the Everett surface of relays at random places, along a random walk that also leaves the range.
-    Their weights are sums of powers of two, so that no order of adding them rounds."""
+    """Outputs are equal for the Everett surface of relays at random places, on a walk that also leaves the range.
+    The weights are sums of powers of two, so that no order of adding them rounds."""
     rng = np.random.default_rng(seed)
     places = np.sort(rng.uniform(-3.0, 3.0, (400, 2)))
     beta, alpha = places[:, 0], places[:, 1]
@@ -501,8 +501,8 @@ def test_preisach_is_a_sum_of_relays(seed: int) -> None:
 
 
 def test_preisach_is_a_play_sum_for_its_everett_surface() -> None:
-    """`E(a, b) = sum p_i max(a - b - 2 r_i, 0)`; all relays down are plays after a fall from far to the lowest. All are
-    sums of powers of two, which no operation rounds."""
+    """`E(a, b) = sum p_i max(a - b - 2 r_i, 0)`; relays all down correspond to plays after a fall from far above to the
+    lowest input. All numbers are sums of powers of two, which no operation rounds."""
     r, p = [0.0, 0.5, 1.125, 2.3125], [0.6875, 0.5, 0.3125, 0.875]
 
     def everett(a: Array, b: Array) -> Array:
@@ -521,8 +521,8 @@ def test_preisach_is_a_play_sum_for_its_everett_surface() -> None:
 
 
 def test_preisach_wipes_out_and_is_congruent() -> None:
-    """A passed extremum leaves nothing behind, and loops between the same inputs have the same shape whatever was
-    before, but not at another place (Mayergoyz 1991)."""
+    """A passed extremum leaves no trace, and loops between the same inputs have the same shape whatever came before,
+    but another shape at another place (Mayergoyz 1991)."""
     plant = EVERY["Preisach"]
     tail = path([4.0, -2.0, 1.0], 20)
     one, other = plant.simulate([3.0, -1.0, 2.0, 0.5, *tail]), plant.simulate([-4.5, 1.0, *tail])
@@ -532,7 +532,7 @@ def test_preisach_wipes_out_and_is_congruent() -> None:
     befores = ([4.0], [4.0, -4.0, 1.5], [-1.0, 2.0, 0.0, 1.5])
     shapes = [plant.simulate([*before, *loop])[-len(loop) :] for before in befores]
     assert shapes[0][0] - shapes[1][0] > 0.1
-    # two outputs, which stand on each other, and their difference are rounded in either shape
+    # each shape rounds two outputs, one of which builds on the other, and their difference
     atol = 2.0 * 3.0 * U * np.max(np.abs(shapes))
     for shape in shapes:
         np.testing.assert_allclose(shape - shape[0], shapes[0] - shapes[0][0], rtol=0, atol=atol)
@@ -550,8 +550,8 @@ def test_preisach_starts_after_its_history() -> None:
 
 
 def test_an_everett_table_is_the_integral_of_its_density() -> None:
-    """Exactly at the edges for a density that is constant in cells; bilinear between, and 0 on the diagonal. All are
-    sums of powers of two, which no operation rounds."""
+    """The table is exact at the edges for a density that is constant in cells, bilinear between, 0 on the diagonal.
+    All numbers are sums of powers of two, which no operation rounds."""
     edges = [0.0, 1.0, 2.5, 3.0]
 
     def density(alpha: Array, beta: Array) -> Array:
@@ -575,7 +575,7 @@ def test_an_everett_table_is_the_integral_of_its_density() -> None:
 
 
 def kp_kernel(v: Array, p1: float, p2: float, ramp: float, start: float) -> Array:
-    """As defined (Banks, Kurdila and Webb 1997): what the last turn remembers against the ridge of the direction."""
+    """The kernel of Banks, Kurdila and Webb (1997): the value of the last turn, limited by the direction's ridge."""
 
     def ridge(x: float) -> float:
         return -1.0 if x < 0.0 else 1.0 if x > ramp else -1.0 + 2.0 * x / ramp
@@ -592,7 +592,7 @@ def kp_kernel(v: Array, p1: float, p2: float, ramp: float, start: float) -> Arra
 
 @pytest.mark.parametrize("start", [-1.0, 0.3125])
 def test_kp_is_its_kernels(start: float) -> None:
-    """All are sums of powers of two, and the ramp is one, so that no operation rounds."""
+    """All numbers are sums of powers of two, and the ramp is a power of two, so that no operation rounds."""
     rng = np.random.default_rng(5)
     places = np.sort(rng.integers(-4096, 3072, (60, 2)) / 1024.0)
     weights = rng.integers(-1024, 1024, 60) / 1024.0
@@ -616,7 +616,7 @@ def test_kp_with_narrow_ramps_is_preisach() -> None:
 
 
 def test_a_kp_kernel_with_a_wide_ramp_is_a_play() -> None:
-    """Inside its ramp: `2 / ramp` times the play of threshold (p_2 - p_1) / 2 about the middle; nothing is rounded."""
+    """Inside its ramp it is `2 / ramp` times the play of threshold (p_2 - p_1) / 2 about the middle, exactly."""
     p1, p2, ramp = -6.0, -4.375, 16.0
     v = path(samples=32)
     middle, r = (p1 + p2 + ramp) / 2.0, (p2 - p1) / 2.0
@@ -651,12 +651,12 @@ def anhysteretic(field: float, magnetization: float, ms: float = MS, a: float = 
 
 
 def test_langevin_has_all_its_digits() -> None:
-    """Against mpmath with 40 digits, on both sides of where the series takes over."""
+    """Values agree with mpmath at 40 digits, on both sides of the change to the series."""
     with mpmath.workdps(40):
         for x in (1e-9, 1e-3, 0.02, 0.0499, 0.0501, 0.3, 2.0, 39.0, 41.0, 1e4):
             exact = mpmath.coth(x) - 1 / mpmath.mpf(x)
             slope = 1 / mpmath.mpf(x) ** 2 - 1 / mpmath.sinh(x) ** 2
-            # where the difference is taken it cancels to x / 3: 3 / x^2 roundings
+            # the difference cancels to x / 3, which magnifies rounding by 3 / x^2
             slack = 4.0 * EPS * (1.0 + 3.0 / max(x, 0.05) ** 2)
             for sign in (1.0, -1.0):
                 assert abs(langevin(sign * x) - sign * exact) <= slack * abs(exact)
@@ -666,7 +666,7 @@ def test_langevin_has_all_its_digits() -> None:
 
 
 def test_jiles_atherton_is_its_equations(allowed: list[float]) -> None:
-    """M_irr by scipy and M from `M = (1 - c) M_irr + c M_an(H + alpha M)` by root finding, instead of dM/dH."""
+    """Expected: M_irr by scipy, and M from `M = (1 - c) M_irr + c M_an(H + alpha M)` by root finding, not dM/dH."""
 
     def total(field: float, irreversible: float) -> float:
         return float(
@@ -687,7 +687,7 @@ def test_jiles_atherton_is_its_equations(allowed: list[float]) -> None:
 
 
 def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibility(allowed: list[float]) -> None:
-    """The relations of Jiles, Thoelke and Devine 1992 between k and what is read from a loop.
+    """The relations of Jiles, Thoelke and Devine (1992) between k and values read from a loop hold.
 
     At the coercive field, with its slope X: `k = M_an/(1-c) (alpha + (1-c) / (X - c dM_an/dH))`; at the remanence
     `M_r = M_an + k / (alpha/(1-c) + 1 / (X - c dM_an/dH))`; at the origin dM/dH = c dM_an/dH, about c M_s / 3a.
@@ -708,11 +708,11 @@ def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibilit
         return apart / (1.0 - C) * (ALPHA + (1.0 - C) / (x - C * reversible))
 
     def remanence(k: int, step: int) -> float:
-        # rising through the field 0 the remanence is negative, and so are M_an and the term of k
+        # on a rise through field 0 the remanence is negative, and so are M_an and the term of k
         _, x, reversible = at(k, step)
         return anhysteretic(0.0, float(rise[k])) - K / (ALPHA / (1.0 - C) + 1.0 / (x - C * reversible))
 
-    # differences over two steps are off by four times as much as those over one, those by a third of the change
+    # differences over two steps have four times the error of those over one step, which is a third of the change
     coercive, without = int(np.argmin(np.abs(rise))), int(np.argmin(np.abs(h)))
     assert 0.0 < h[coercive] < 1.5 * K
     assert abs(pinning(coercive, 1) - K) <= 0.5 * abs(pinning(coercive, 2) - pinning(coercive, 1))
@@ -725,13 +725,13 @@ def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibilit
     first = IRON.simulate([step])[0] / step
     reversible = C * MS / (3.0 * A)
     slope = reversible / (1.0 - ALPHA * reversible)
-    # M_irr lags behind M_an by all of it at most, and adds that over k to the slope
+    # M_irr lags behind M_an by at most all of it; that lag over k is added to the slope
     ahead = MS / (3.0 * A - ALPHA * MS) * step / K
     assert -sum(allowed) / step <= first - slope <= ahead + sum(allowed) / step
 
 
 def test_jiles_atherton_without_pinning_is_anhysteretic(allowed: list[float]) -> None:
-    """`|M - M_an| <= k dM/dH`, so nothing is left as k goes to 0; initial slope `M_s / (3 a - alpha M_s)` (1992)."""
+    """`|M - M_an| <= k dM/dH`, which vanishes as k goes to 0; the initial slope is `M_s / (3 a - alpha M_s)` (1992)."""
     k = 0.05
     plant = plants.JilesAtherton(MS, A, k, ALPHA, C)
     v = path([0.0, 4000.0, -4000.0, 1000.0], 400)
@@ -740,7 +740,7 @@ def test_jiles_atherton_without_pinning_is_anhysteretic(allowed: list[float]) ->
     gap = np.abs([anhysteretic(float(x), float(y)) - y for x, y in zip(v, m, strict=True)])
     assert gap.max() > 0.0
     assert np.all(gap <= k * steepest)
-    # k off in the field, and the cubic term of M_an, a share x^2 / 15 of it
+    # the field is off by k, and the cubic term of M_an is a share x^2 / 15 of it
     x = (20.0 + ALPHA * steepest * 20.0) / A
     allowed.clear()
     first = plant.simulate([20.0])[0]
@@ -749,7 +749,7 @@ def test_jiles_atherton_without_pinning_is_anhysteretic(allowed: list[float]) ->
 
 
 def test_jiles_atherton_never_has_a_negative_slope() -> None:
-    """The guard of Deane 1994: without it M goes on rising after the field has turned."""
+    """The guard of Deane (1994): without it, M goes on rising after the field has turned."""
     field = path([0.0, 1500.0, 800.0, 1500.0, -1500.0, 200.0], 300)
     assert np.all(np.diff(IRON.simulate(field)) * np.diff(field) >= 0.0)
 
@@ -765,7 +765,7 @@ def example() -> Iterator[Any]:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
+    sys.modules[spec.name] = module  # dataclasses look up their module
     spec.loader.exec_module(module)
     yield module
     del sys.modules[spec.name]
@@ -773,11 +773,11 @@ def example() -> Iterator[Any]:
 
 @pytest.mark.parametrize("name", ["Preisach, surface of a play sum", "Maxwell-slip"])
 def test_plants_that_are_play_sums_are_linearised_to_the_rounding(example: Any, name: str) -> None:
-    """With their thresholds given, that is what identification finds: the rest is the arithmetic's.
+    """Given their thresholds, identification finds these plants exactly; only the error of the arithmetic remains.
 
-    A float32 compensator rounds reference, sum and drive, and a plant's steepest slope is a few times its mean one:
-    8 units of the last place of full scale hold all of it. Weights are written with 10 digits, and found to them; the
-    plays, weighted, add up to less than twice the output's range, and exchanged they stand in front of that slope.
+    A float32 compensator rounds reference, sum and drive, and a plant's steepest slope is a few times its mean slope:
+    8 units in the last place of full scale cover all of that. Weights are written with 10 digits and found as exactly;
+    the weighted plays add up to less than twice the output range, and the steepest slope multiplies their error.
     """
     (case,) = (case for case in example.cases() if case.name == name and case.thresholds)
     result = example.measure(case)
@@ -789,8 +789,8 @@ def test_plants_that_are_play_sums_are_linearised_to_the_rounding(example: Any, 
 
 
 def test_other_plants_are_linearised_about_as_well_as_they_are_identified(example: Any) -> None:
-    """On a Preisach plant that no play sum is, a GPI inverse leaves what the model had not described: on another record
-    up to a few times the held-out error (docs/plants.md: 1.3 to 2.4 times), a tenth of what a straight line leaves."""
+    """On a Preisach plant that is not a play sum, a GPI inverse leaves the error of its model: on another record up to
+    a few times the held-out error (docs/plants.md: 1.3 to 2.4 times), a tenth of the error with a straight line."""
     name = "Preisach, bell-shaped density"
     cases = zip(example.cases(), page_rows()[1:], strict=True)
     ((case, kept),) = (both for both in cases if both[0].name == name and both[0].model == "auto")
@@ -800,7 +800,7 @@ def test_other_plants_are_linearised_about_as_well_as_they_are_identified(exampl
     assert result.compensated[0] <= 0.1 * result.scaled[0]
     row = example.row(result)
     assert [*row[:3], row[-1]] == [*kept[:3], kept[-1]]
-    # as far as the digits shown, where another machine may round otherwise
+    # to the digits shown, which another machine may round otherwise
     np.testing.assert_allclose([float(x) for x in row[3:-1]], [float(x) for x in kept[3:-1]], rtol=0.11)
 
 
@@ -837,7 +837,7 @@ def test_what_the_page_says_of_its_table(example: Any) -> None:
 
 
 def test_friction_of_more_than_half_the_spring_has_no_inverse(example: Any) -> None:
-    """After a reversal the slope is the spring's less up to twice the friction's, 0.07 (docs/plants.md)."""
+    """After a reversal the slope is the spring's, 0.05, less up to twice the friction's, 0.07 (docs/plants.md)."""
     friction = plants.Dahl(sigma=0.035, limit=0.4)
     v = 100.0 * example.training()
     y = 0.05 * v - friction.simulate(v)
@@ -849,17 +849,17 @@ def test_friction_of_more_than_half_the_spring_has_no_inverse(example: Any) -> N
 
 
 def test_what_a_play_sum_cannot_do_is_distinguished(example: Any) -> None:
-    """Spread over places, dependence on history and openness of minor loops: 0 for a play sum, and each kind of plant
-    shows those that its remark names."""
+    """Spread over places, dependence on history and openness of minor loops are 0 for a play sum, and each kind of
+    plant shows the ones that its remark names."""
     cases = {case.name: case for case in example.cases()}
     traits = {name: example.memory(case) for name, case in cases.items()}
 
     def rounding(name: str, each: int) -> float:
-        """Of two heights, in %, where every output has at most so many roundings of the size of the largest."""
+        """Rounding error of a loop's height in %, if every output has at most `each` roundings of the largest size."""
         y = np.abs(cases[name].plant(example.in_range(np.array([0.5, 0.0, 1.0, 0.45, 0.55]), cases[name].drive)))
         return float(100.0 * 4.0 * each * U * np.max(y) / abs(y[-1] - y[-2]))
 
-    # each output of a surface stands on 5 others at most, each with 8 roundings of a surface and two of an input
+    # each output of a surface adds up at most 5 values, each with 8 roundings of the surface and two of an input
     assert max(traits["Preisach, surface of a play sum"]) <= rounding("Preisach, surface of a play sum", 50)
     # 6 samples with two roundings in each of 4 stops and two of an input, then a sum of 5 products
     assert max(traits["Maxwell-slip"]) <= rounding("Maxwell-slip", 24)

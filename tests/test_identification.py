@@ -1,6 +1,6 @@
-"""Identification: against brute force, other solvers, other plants, and measured records.
+"""Identification compared with brute force, other solvers, other plants, and measured records.
 
-What is expected is computed here, by loops and relays that share no code with the package.
+Expected values are computed here, by loops and relays that share no code with the package.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ WEIGHTS = (0.05, 0.02, 0.04, 0.01, 0.03, 0.02)
 
 
 def relay_output(v: Array, thresholds: Sequence[float], weights: Sequence[float], low: float, high: float) -> Array:
-    """A plane of relays: for each half width r, many that switch up at c + r and down at c - r, all down at first.
+    """A plane of relays: for each half width r, relays that switch up at c + r and down at c - r, all down at first.
 
-    They are spaced by one grid step in c, so that a play of threshold r is met within half a step.
+    They are one grid step apart in c, so that a play of threshold r is matched to within half a step.
     """
     step = 0.05
     y = np.zeros(len(v))
@@ -75,7 +75,7 @@ def row(fit: Fit, part: str, model: str = "written") -> Any:
 
 
 def table_of(out: str) -> dict[str, dict[str, str]]:
-    """The fit table as printed: part -> column -> cell, of the written model."""
+    """The fit table as printed, for the written model: part -> column -> cell."""
     lines = out.splitlines()
     head = lines[0].split()
     assert head == ["part", "model", "samples", "ignored", "rms", "rms", "%", "max", "max", "%", "records"]
@@ -89,7 +89,7 @@ def table_of(out: str) -> dict[str, dict[str, str]]:
 
 
 def check_predicts(path: Path, data: Path, skip: int = 0) -> tuple[float, float, float]:
-    """Error figures of the written model on a file, free run by brute force; start at rest at the first drive."""
+    """Error figures of the written model on a file, run freely by brute force from rest at the first drive."""
     pi = written(path)["model"]["pi"]
     _, v, y = columns(data)
     first = max(first_exact(v, pi["thresholds"][-1]), skip)
@@ -97,7 +97,7 @@ def check_predicts(path: Path, data: Path, skip: int = 0) -> tuple[float, float,
 
 
 def check_verifies(path: Path) -> None:
-    """What ends every identification: the C of the model gives the bits of the reference."""
+    """The C of the identified model gives the bits of the reference."""
     compiler = compilers.available()[0].name
     report = hystgen.verify(hystgen.load(path), operator="both", compiler=(compiler,), length=5000)
     assert report.ok, report.table()
@@ -110,7 +110,7 @@ def check_verifies(path: Path) -> None:
 @pytest.mark.data
 class TestMeasured:
     def test_flexure_stage(self, measured: Path, tmp_path: Path, run: Run) -> None:
-        """P-885 stack: sine to fading sine and hold, with the start-up transient of both left out."""
+        """P-885 stack, fitted to a sine and judged on a fading sine and hold, both without their start-up transient."""
         data = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
         held = part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300)
         target = tmp_path / "p885.yaml"
@@ -129,7 +129,7 @@ class TestMeasured:
         check_verifies(target)
 
     def test_flexure_stage_beyond_the_fitted_range(self, measured: Path, tmp_path: Path, run: Run) -> None:
-        """A play near the largest drive seen must not take a weight that ruins a slightly larger motion."""
+        """A play near the largest drive seen must not get a weight that ruins a slightly larger motion."""
         data = part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300)
         larger = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
         target = tmp_path / "p885.yaml"
@@ -144,7 +144,7 @@ class TestMeasured:
         assert check_predicts(target, larger)[2] <= 1.5
 
     def test_150_v_actuator(self, measured: Path, tmp_path: Path, run: Run) -> None:
-        """Fitted to two periods of a sine after a step that rings, compared with the later ones."""
+        """Fitted to two periods of a sine after a step that rings, and compared with the later periods."""
         source = measured / "piezo_150v_step_then_1hz.csv"
         data = part_of_file(source, tmp_path / "first.csv", 17500, 27500)
         held = part_of_file(source, tmp_path / "later.csv", 27500)
@@ -157,7 +157,7 @@ class TestMeasured:
         check_verifies(target)
 
     def test_150_v_actuator_in_one_file(self, measured: Path, tmp_path: Path, run: Run) -> None:
-        """The rest, the step and its ringing are left out by --skip, and the history is known: none."""
+        """--skip leaves out the rest, the step and its ringing, which still move the plays."""
         source = measured / "piezo_150v_step_then_1hz.csv"
         data = part_of_file(source, tmp_path / "first.csv", 0, 27500)
         held = part_of_file(source, tmp_path / "later.csv", 27500)
@@ -171,7 +171,7 @@ class TestMeasured:
 
 
 def centred_system(parts: Sequence[tuple[Array, Array]], thresholds: Sequence[float]) -> tuple[Array, Array]:
-    """Plays and outputs of several pieces, the mean of each piece taken out: a free offset per piece."""
+    """Plays and outputs of several pieces, less the mean of each piece, which stands for its free offset."""
     a = np.concatenate([plays - plays.mean(axis=0) for plays, _ in parts])
     b = np.concatenate([y - y.mean() for _, y in parts])
     assert a.shape == (len(b), len(thresholds))
@@ -181,7 +181,7 @@ def centred_system(parts: Sequence[tuple[Array, Array]], thresholds: Sequence[fl
 class TestWeights:
     @pytest.mark.parametrize("history", [None, (80.0, -20.0)])
     def test_least_squares_solution_of_another_solver(self, history: tuple[float, ...] | None) -> None:
-        """Two records with offsets of their own, some constraints active; also the optimality conditions themselves."""
+        """Two records have separate offsets and some constraints are active; the optimality conditions hold too."""
         # Plays 2 and 4 pull the other way, which a model with non-negative weights cannot follow
         crooked = (0.05, 0.02, -0.03, 0.05, -0.02, 0.06)
         before = 0.0 if history is None else brute_plays(history, THRESHOLDS, 0.0)[-1]
@@ -214,7 +214,7 @@ class TestWeights:
         assert row(fit, "fit").rms_percent < 0.05
 
     def test_known_plant_with_noise(self) -> None:
-        """Each weight within five standard deviations, as the data's own covariance gives them."""
+        """Each weight is within five standard deviations, which come from the covariance of the data."""
         sigma = 0.02
         v = wander(4)
         plays = brute_plays(v, THRESHOLDS, 0.0)
@@ -255,7 +255,7 @@ class TestWeights:
         assert [x.rms_percent for x in other.rows] == pytest.approx([x.rms_percent for x in plain.rows], rel=1e-4)
 
     def test_a_small_p0_is_raised_where_the_data_hardly_tell(self) -> None:
-        """The best solution under p_0 >= 5 % of the sum, as a general minimiser finds it."""
+        """The fit is the best one under p_0 >= 5 % of the sum, as found by a general minimiser."""
         v = wander(8)
         plays = brute_plays(v, THRESHOLDS, 0.0)
         y = noisy(plays @ np.array((0.0, *WEIGHTS[1:])), 0.2)
@@ -287,7 +287,7 @@ class TestWeights:
 
     @pytest.mark.parametrize("sigma", [0.0, 0.02])
     def test_real_backlash_stays(self, sigma: float, tmp_path: Path) -> None:
-        """A third more error would be the price of a p_0 of 5 % here."""
+        """Raising p_0 to 5 % would cost a third more error here."""
         v = wander(8)
         y = noisy(brute_output(v, THRESHOLDS, (0.0, *WEIGHTS[1:]), 0.0), sigma)
         fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=())
@@ -316,7 +316,7 @@ class TestThresholds:
     @pytest.mark.parametrize("history", [None, (), (60.0, -90.0)])
     @pytest.mark.parametrize("shape", ["sine", "offset sine", "wander", "growing"])
     def test_every_play_moves(self, shape: str, history: tuple[float, ...] | None, count: int | None) -> None:
-        """The largest play travels over 15 % of the drive's range or more in what is compared; brute force says so."""
+        """By brute force, every play travels over 15 % of the drive's range or more within the samples compared."""
         k = np.arange(1200)
         v = {
             "sine": 50.0 * np.sin(k / 40.0),
@@ -332,7 +332,7 @@ class TestThresholds:
         assert len(p) == len(r)
         assert count is None or len(r) == count + 1
         first = first_exact(v, float(r[-1])) if history is None else 0
-        assert row(fit, "all").ignored == (0 if shape == "growing" else first)  # found where too little is left else
+        assert row(fit, "all").ignored == (0 if shape == "growing" else first)  # `growing`: the start is estimated
         states = brute_plays(history or [0.0], r, 0.0)[-1] if history is not None else float(v[0])
         moved = np.ptp(brute_plays(v, r, states)[first:], axis=0)
         assert moved.min() >= 0.149 * np.ptp(v[first:])
@@ -340,7 +340,7 @@ class TestThresholds:
             assert r[-1] <= 0.43 * np.ptp(v)
 
     def test_fewest_plays_that_do(self) -> None:
-        """A plant of two plays: many are not needed and not taken."""
+        """A plant of two plays is fitted with few plays."""
         v = wander(12)
         y = noisy(brute_output(v, (0.0, 10.0), (0.5, 0.5), 0.0), 0.5)
         assert len(fitted(hystgen.identify(record(v, y)))[0]) - 1 <= 8
@@ -367,7 +367,7 @@ class TestThresholds:
 class TestStartMemory:
     @pytest.mark.parametrize("history", [(), (0.0,), (50.0,), (100.0, -100.0), (5.0, -9.0, 3.0), (-35.0, 60.0, -8.0)])
     def test_history_is_walked_through(self, history: tuple[float, ...], tmp_path: Path, run: Run) -> None:
-        """The memory written is that of virgin plays led through the history, and the fit starts from it."""
+        """The memory written is that of virgin plays after the history, and the fit starts from it."""
         before = brute_plays([0.0, *history], THRESHOLDS, 0.0)[-1]
         v = wander(13, -60.0, 80.0)
         y = brute_output(v, THRESHOLDS, WEIGHTS, before) + 3.25
@@ -413,7 +413,7 @@ class TestStartMemory:
 
     @pytest.mark.parametrize("start", [-38.0, 0.0, 25.0])
     def test_unknown_start_is_ignored(self, start: float) -> None:
-        """Whatever the plant's start memory and whatever the sensor said before it was wiped: the same model."""
+        """The model depends neither on the plant's start memory nor on the output before that memory was wiped out."""
         places = [40.0, 60.0, 20.0, 100.0, 0.0, 75.0, 10.0, 90.0, 45.0, 55.0, 5.0, 100.0, 0.0, 50.0]
         v = np.interp(np.arange(521) / 40.0, np.arange(14), places)
         memory = [min(max(start, v[0] - r), v[0] + r) for r in THRESHOLDS]
@@ -430,14 +430,14 @@ class TestStartMemory:
         garbage[:settled] = 1e3
         again = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, holdout=record(v, y))
         assert again.parameters == fit.parameters
-        garbage[settled : settled + 8] += 1.0  # more in a row than are taken for a fault of the recording
+        garbage[settled : settled + 8] += 1.0  # too many in a row to count as a fault of the recording
         spoilt = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, holdout=record(v, y))
         assert spoilt.parameters != fit.parameters
 
     @pytest.mark.parametrize("seed", range(6))
     @pytest.mark.parametrize("noise", [0.0003, 0.01])
     def test_noise_of_the_drive_does_not_choose_among_turns(self, seed: int, noise: float) -> None:
-        """A drive that begins and ends at its least value: its first rise makes the memory known."""
+        """The drive begins and ends at its least value, and its first rise makes the memory known, noise or not."""
         rng = np.random.default_rng(seed)
         at = np.arange(3001)
         v = 50.0 * (1.0 - np.cos(2.0 * np.pi * 3.0 * at / 3000)) * (1.0 - at / 6000)
@@ -503,7 +503,7 @@ class TestOffsets:
 
 class TestFigures:
     def test_shipped_recording(self, tmp_path: Path, run: Run) -> None:
-        """Below 1 % on both shipped files; every printed figure is recomputed from what was written."""
+        """Errors are below 1 % on both shipped files, and every printed figure is recomputed from the written model."""
         data, held = EXAMPLES / "stage_recording.csv", EXAMPLES / "stage_holdout.csv"
         target = tmp_path / "stage.yaml"
         code, out, err = run("identify", data, "--holdout", held, "-o", target)
@@ -570,7 +570,7 @@ class TestFigures:
         assert row(fits[0], "held out").rms != row(fits[1], "held out").rms
 
     def test_a_held_out_record_that_shows_nothing_is_refused(self) -> None:
-        """One sample and a free offset would make an error of 0."""
+        """A single sample with a free offset would have an error of 0."""
         v = wander(28)
         made = record(v, brute_output(v, THRESHOLDS, WEIGHTS, 0.0))
         ramp = np.linspace(20.0, 60.0, 300)
@@ -622,7 +622,7 @@ class TestWritten:
         assert list(content["model"]["pi"]) == ["thresholds", "weights"]
         pi = content["model"]["pi"]
         assert len(pi["thresholds"]) == len(pi["weights"]) > 1
-        # the range of what was compared
+        # the drive range of the samples compared
         starts = [first_exact(x, pi["thresholds"][-1]) for x in (v, w)]
         compared = np.concatenate([v[starts[0] :], w[starts[1] :]])
         assert content["input_range"] == [compared.min(), compared.max()]
@@ -731,7 +731,7 @@ class TestRefused:
         assert list(tmp_path.iterdir()) == []
 
     def test_an_older_file_stays_and_no_traceback(self, tmp_path: Path) -> None:
-        """The command itself, as a shell would run it."""
+        """The command is run as from a shell."""
         path = write_csv(tmp_path / "data.csv", SINE[:5], SINE[:5])
         (tmp_path / "a.yaml").write_text("older\n")
         command = [sys.executable, "-m", "hystgen.cli", "identify", str(path), "-o", str(tmp_path / "a.yaml")]

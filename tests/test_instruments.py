@@ -1,4 +1,4 @@
-"""Files of instruments, written here by their makers' descriptions of the formats."""
+"""Files of instruments, written here from their makers' descriptions of the formats."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
 
 
 def test_labview_in_segments(tmp_path: Path) -> None:
-    """Each segment has a header of its own; its times count from its date and time where they are relative."""
+    """Each segment has its own header; relative times count from the segment's date and time."""
     for pref, shift in (("Relative", 120.5), ("Absolute", 120.5)):
         first = [line.replace("Relative", pref) for line in lvm()]
         first.insert(19, "\t".join(("Time", "14:21:05.0", "14:21:05.0", "")))
@@ -143,7 +143,7 @@ def test_a_header_of_a_segment_across_blocks(tmp_path: Path, monkeypatch: pytest
     np.testing.assert_allclose(record.t, np.concatenate([T, T + 10.0]), rtol=0, atol=1e-6)
 
 
-# Tektronix, by what the manuals of MDO, MSO and DPO say of spreadsheet files ----------------------------------------
+# Tektronix, by the manuals of MDO, MSO and DPO on spreadsheet files -------------------------------------------------
 
 
 def tektronix(label: str = "Drive,Sensor", unit: str = "V,V") -> list[str]:
@@ -174,7 +174,7 @@ def test_tektronix(tmp_path: Path) -> None:
     assert read_record(put(tmp_path / "a.csv", tektronix(unit="V,A"))).units["y"] == "A"
 
 
-# Keysight InfiniiVision and DAQ: two lines of header, UTF-16 with lines above it -------------------------------------
+# Keysight: InfiniiVision with two header lines, DAQ in UTF-16 with lines above the header ----------------------------
 
 
 def test_keysight(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
     assert "2 columns where the header has 3" in problem(put(tmp_path / "d.dat", lines, "\n"), columns={"v": "#1"})
 
 
-# Others: read as they are, or one question, whose own example is an answer -------------------------------------------
+# Other instruments: read as they are, or refused with an example of --columns that works -----------------------------
 
 
 def rows(form: str) -> list[str]:
@@ -329,7 +329,7 @@ def test_tdms(tmp_path: Path) -> None:
     assert record.read_as == "v = Drive, y = Sensor; time from wf_increment 0.001 s (Scan/Drive)"
     assert record.notes == ("columns without numbers were left out: Scan/Remark",)
     check(read_record(path, parse_columns("v=Scan/Drive,y=Sensor")))
-    # Waveforms that start apart are not put side by side
+    # Waveforms that start at different times are not put side by side
     later = {**wave, "wf_start_offset": 0.2}
     path = write_tdms(tmp_path / "b.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor=later)
     assert "the columns start at different times: Scan/Drive at 2024-03-05T14:21:05" in problem(path)
@@ -384,7 +384,7 @@ def test_tdms_scaled_from_codes(tmp_path: Path) -> None:
     assert record.sample_time == 0.001
 
 
-# Simulink and ControlDesk: lists of structs, the numbers beside a text that says what they are ----------------------
+# Simulink and ControlDesk: lists of structs, each with numbers and a text that names them ---------------------------
 
 
 def matlab(group: Any, name: str, x: Any) -> Any:
@@ -398,7 +398,7 @@ def matlab(group: Any, name: str, x: Any) -> Any:
 def write_list(
     path: Path, version: str, folder: str, time: dict[str, Any], traces: list[dict[str, Any]], of: str
 ) -> Path:
-    """A struct with a time, a vector or a struct of its own, and a list of structs `of`."""
+    """Write a struct with a time, which is a vector or a struct of its own, and a list of structs named `of`."""
     if version == "v5":
         listed = np.array([tuple(each.values()) for each in traces], dtype=[(key, "O") for key in traces[0]])
         scipy.io.savemat(path, {folder: {**time, of: listed}})
@@ -432,7 +432,7 @@ def test_lists_of_structs(tmp_path: Path, version: str) -> None:
     record = read_record(write_list(tmp_path / "controldesk.mat", version, "run1", time, traces, "Y"))
     check(record)
     assert record.units == {"v": "V", "y": "um"}
-    # Without labels that tell them apart they are asked for, by their places in the list
+    # If labels do not tell them apart, the message asks for them by their places in the list
     traces = [{"values": V, "label": "x"}, {"values": Y, "label": "x"}]
     path = write_list(tmp_path / "alike.mat", version, "out", {"time": T}, traces, "signals")
     assert problem(path).endswith(', for example --columns "v=out.signals.(1).values,y=out.signals.(2).values"')
@@ -440,7 +440,7 @@ def test_lists_of_structs(tmp_path: Path, version: str) -> None:
 
 
 def test_lists_of_structs_open_no_other_file(tmp_path: Path) -> None:
-    """Links out of the file, and numbers that it keeps elsewhere, beside and behind the fields of a list."""
+    """The file links to other files and stores numbers in another one, both in and next to the fields of a list."""
     traces = [{"values": V, "label": "drive"}, {"values": Y, "label": "position"}]
     path = write_list(tmp_path / "a.mat", "v73", "out", {"time": T}, traces, "signals")
     (tmp_path / "raw").write_bytes((2 * Y).tobytes())

@@ -1,4 +1,4 @@
-"""Compiled functions: what runs, when it is compiled, and what makes it be compiled anew."""
+"""Compiled functions: when they run as Python, when they are compiled, and what makes them be compiled again."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from hystgen.verification.comparison import expected_records
 
 pytestmark = pytest.mark.thorough
 
-LARGE = 2**70  # no number of a compiled function
+LARGE = 2**70  # too large for a compiled function
 
 FACTOR = 3
 
 EFFECTS = {"loop": ("everything", "soft_dashpot", "bumpy", "dilated"), "corners": ("creeping", "worn")}
-"""Models with effects by engine: with plays as they are, of each way in which effects move and bend them."""
+"""Models with effects by engine; those of `loop` cover each way in which effects move or bend plays."""
 
 
 @jit
@@ -71,7 +71,7 @@ def test_without_numba_everything_is_python_and_that_is_said_once(monkeypatch: p
 def test_without_numba_the_bit_reference_gives_the_same_bits(
     arithmetic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a model without effects, which `test_emission.py` compiles in every arithmetic and engine."""
+    """The model has no effects; `test_emission.py` compiles such models in every arithmetic and engine."""
     same_bits(Model(parse_parameters(FILES["mixed"])).tables(arithmetic, "corners"), arithmetic, monkeypatch)
 
 
@@ -81,15 +81,15 @@ def test_without_numba_the_bit_reference_gives_the_same_bits(
 def test_without_numba_effects_give_the_same_bits(
     engine: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever the model's effects are, the functions of an engine and an arithmetic are the same and compiled once."""
+    """For an engine and an arithmetic, all models with effects share the same functions, which are compiled once."""
     for name in EFFECTS[engine]:
         chain = Model(parse_parameters(CHAINS[name])).chain
         same_bits(chain_tables.build(chain, arithmetic, 1e-3, engine=engine).tables, arithmetic, monkeypatch)
 
 
 def same_bits(tables: Any, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The bit reference answers alike compiled and as Python, over the records of `verify`, and without a warning of
-    numpy."""
+    """Check that the bit reference gives the same bits compiled and as Python over the records of `verify`, and that
+    numpy does not warn."""
     found = []
     monkeypatch.setattr(jitting, "SHORT", 0)
     for has_numba in (True, False):
@@ -104,7 +104,7 @@ def same_bits(tables: Any, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first samples of a function and type run as Python, those behind them and all of a long record do not."""
+    """The first samples of each function and type run as Python; later ones and all of a long record run compiled."""
 
     def as_python(samples: int, dtype: type[np.generic] = np.float64, function: Jit[..., Any] = tripled) -> bool:
         with jitting.for_samples(function, np.zeros(samples, dtype)):
@@ -113,7 +113,7 @@ def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(jitting, "_samples", Counter())
     some = jitting.SHORT // 2
     assert not as_python(jitting.SHORT + 1)
-    with jitting.plain():  # which runs as Python anyway
+    with jitting.plain():  # inside it, all samples run as Python
         assert as_python(jitting.SHORT + 1)
         assert all(as_python(some) for _ in range(3))
     assert [as_python(some) for _ in range(3)] == [True, True, False]
@@ -122,7 +122,7 @@ def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_factory_makes_functions_of_what_it_is_given() -> None:
-    """Closures are compiled each with its own parts, and found again under its own name in the cache."""
+    """Each closure is compiled with its own parts and found again in the cache under its own mark."""
 
     def twice(step: Callable[[Any], Any]) -> Jit[[Any], Any]:
         @jit
@@ -152,7 +152,7 @@ def outer(x):
 
 
 def test_the_mark_is_of_everything_that_takes_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same text gives the same mark; another callee or constant another one."""
+    """The same text gives the same mark; a different callee or constant gives a different one."""
     monkeypatch.syspath_prepend(tmp_path)
     marks = {}
     for name, factor, inner in (("a", 1, "x + x"), ("b", 1, "x + x"), ("c", 2, "x + x"), ("d", 1, "x * x")):

@@ -57,7 +57,7 @@ void apply_atanh(const hystgen_real_t *x, hystgen_real_t *y, size_t n)
 }
 """
 
-# every 2^-20th bit pattern of the format, infinities and NaN among them; the process dies on undefined behaviour
+# 2^20 bit patterns spread over the format, infinities and NaN among them; the process dies on undefined behaviour
 TRAP_MAIN = """
 #include <string.h>
 #include "hystgen_runtime.h"
@@ -78,7 +78,7 @@ int main(void)
 
 
 def command(compiler: str, language: str = "c") -> list[str]:
-    """How to call a compiler; without it the test fails in CI and is skipped elsewhere."""
+    """Command of a compiler; if it is missing, the test fails in CI and is skipped elsewhere."""
     names = {"gcc": ("gcc", "g++"), "clang": ("clang", "clang++")}
     if compiler == "zig":
         if importlib.util.find_spec("ziglang"):
@@ -123,7 +123,7 @@ def c_kernels(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., SimpleN
         library = folder / f"{compiler}_{name}_{optimisation[1:]}.so"
         flags = ["-std=c99", optimisation, "-ffp-contract=off", "-fPIC", "-shared", f"-I{RUNTIME}", *real_flags(name)]
         if compiler == "zig":
-            flags.append("-fno-sanitize=undefined")  # zig adds it to -O0
+            flags.append("-fno-sanitize=undefined")  # zig adds the sanitizer to -O0
         files = [str(folder / "driver.c"), *(str(source(kernel, name)) for kernel in KERNELS)]
         run([*command(compiler), *flags, *files, "-o", str(library)])
         ffi = cffi.FFI()
@@ -144,7 +144,7 @@ def c_kernels(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., SimpleN
 
 @functools.cache
 def compiled(kernel: str) -> SimpleNamespace:
-    """Loops around the Python kernel as numba compiles it."""
+    """Loops over the Python kernel, compiled by numba."""
     one = numba.njit(getattr(kernels, kernel).py_func)
     true = math.tanh if kernel == "tanh" else math.atanh
 
@@ -155,7 +155,7 @@ def compiled(kernel: str) -> SimpleNamespace:
 
     @numba.njit(nogil=True)
     def judge(x: np.ndarray, y: np.ndarray, t: Any) -> tuple[float, int, int, int]:
-        """For rising x >= 0 and C's y: worst error in ulp of the true value; how often Python differs from C,
+        """For rising x >= 0 and y from C: worst error in ulp of the true value, and how often Python differs from C,
         y falls, and f(-x) is not -f(x)."""
         worst = 0.0
         differs = falls = uneven = 0
@@ -268,7 +268,7 @@ def sweep(
     t = TABLES[kernel]["float32"]
 
     def part(start: int) -> tuple[float, int, int, int]:
-        stop = min(start + (block + 1) * stride, end)  # one shared with the next block, for the comparison of y
+        stop = min(start + (block + 1) * stride, end)  # one sample is shared with the next block, to compare y
         x = np.arange(start, stop, stride, dtype=np.uint32).view(np.float32)
         return compiled(kernel).judge(x, c(x), t)
 
@@ -289,17 +289,17 @@ def test_float32_error_on_every_983rd_argument(c_kernels: Callable[..., SimpleNa
 @pytest.mark.slow
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_float32_error_on_every_argument(c_kernels: Callable[..., SimpleNamespace], kernel: str) -> None:
-    """The stated error is reached, C equals Python, f never falls and is odd, everywhere."""
+    """On every argument, C equals Python, and f never falls and is odd; the stated error is reached."""
     worst, differs, falls, uneven = sweep(c_kernels, kernel, 1)
     assert (differs, falls, uneven) == (0, 0, 0)
     assert MAX_ULP[kernel]["float32"] - 0.02 <= worst <= MAX_ULP[kernel]["float32"]
 
 
 def float64_arguments(kernel: str) -> Iterator[float]:
-    """Over 20 000 positive ones: where the kernel branches, near 1/2 and 1, tiny, and spread out."""
+    """More than 20 000 positive arguments: where the kernel branches, near 1/2 and 1, tiny, and spread out."""
     rng = np.random.default_rng(7)
     t = TABLES[kernel]["float64"]
-    # the worst that about 10^9 random arguments showed
+    # the worst of about 10^9 random arguments
     yield {"tanh": 0.55080469212778527, "atanh": 0.7501587944095236}[kernel]
     if kernel == "tanh":
         for edge in [*t.knot, *t.bound, 0.5493061443340549]:
@@ -437,7 +437,7 @@ def test_literals_in_c_are_those_of_python(name: str, kernel: str) -> None:
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("name", FORMATS)
 def test_stated_error_is_no_more_than_rounding_can_do(name: str, kernel: str) -> None:
-    """Stated: in float64 the bound itself, rounded up; in float32 what is reached, which the bound must cover."""
+    """The stated error is the bound rounded up in float64, and in float32 the error reached, which the bound covers."""
     bound = getattr(fit_coefficients(), f"{kernel}_error")(name)
     stated = MAX_ULP[kernel][name]
     if name == "float64":
@@ -492,7 +492,7 @@ def test_no_argument_leads_to_undefined_behaviour(tmp_path: Path, name: str, com
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("name", FORMATS)
 def test_text_can_be_carried_into_other_files(name: str, kernel: str) -> None:
-    """Nothing but the kernel's own names at file scope, no macro, no division, no double in float32."""
+    """The file has only the kernel's own names at file scope, no macro, no division, and no double in float32."""
     _, include, text = source(kernel, name).read_text().partition('#include "hystgen_runtime.h"\n')
     assert include
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

@@ -1,4 +1,4 @@
-"""The marks of the tests: what is left out where, and that it is counted; and the count of processor time."""
+"""The marks of tests: which tests are left out where, and that these are counted; and the count of processor time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ONE_PROCESS_AND_XDIST = pytest.mark.parametrize("options", [(), ("-n", "1")], id
 
 
 def call(folder: Path, tests: str, *options: str, **environment: str) -> tuple[int, str]:
-    """Run these tests under the settings of the suite: exit code and what was printed."""
+    """Run these tests under the settings of the suite; return the exit code and the output."""
     for name in ("conftest.py", "processor_time.py"):
         (folder / name).write_text(CONFTEST.with_name(name).read_text())
     (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  data: needs records\n  slow: long\n  thorough: deep\n")

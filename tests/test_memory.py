@@ -1,4 +1,4 @@
-"""Records of arrays and tables in memory: the model that a file of the same samples gives, or one clear message."""
+"""Records from arrays and tables in memory give the same model as a file of the same samples, or one clear message."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def record() -> Record:
 
 
 def columns(step: int = 1) -> dict[str, Any]:
-    """The record's columns, of every sample or one in `step`, which takes a search less."""
+    """Columns of the record: every sample, or one in `step`, which shortens a search."""
     return {"t": record().t[::step], "v": record().v[::step], "y": record().y[::step]}  # type: ignore[index]
 
 

@@ -18,7 +18,7 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import play_sum
 
-U = 2.0**-53  # what one rounding may add, as a share of its result
+U = 2.0**-53  # largest error of one rounding, as a share of its result
 
 EXAMPLE_1 = PI([0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7], [0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012])
 ESTIMATE_2 = PI(
@@ -34,7 +34,7 @@ EXAMPLE_6 = Cascade(PI_4, (TanhEnvelope((6.0, 0.4, 0.0, 0.0)),), 0.0, (-5.0, 5.0
 
 
 def brute(model: Cascade, v: np.ndarray) -> np.ndarray:
-    """The note's formulas, sample by sample, with numpy's tanh; direction as MODEL.md section 5 has it."""
+    """The note's formulas, sample by sample, with numpy's tanh; direction as in MODEL.md section 5."""
     r, p = np.array(model.pi.thresholds), np.array(model.pi.weights)
     s = np.array(model.pi.start)
     first = s[0]
@@ -91,7 +91,7 @@ def test_example_2_inverse_parameters() -> None:
 
 
 def test_example_2_inverse_of_wrong_parameters() -> None:
-    """The printed ones follow from estimates that are printed to four digits, each off by up to half of the last."""
+    """The printed inverse follows from estimates printed to four digits, each off by up to half of the last digit."""
     inverse = ESTIMATE_2.inverse()
     np.testing.assert_allclose(
         inverse.thresholds, [0, 0.3525, 0.9703, 1.8056, 2.8045, 3.9144, 5.0877], rtol=0, atol=2e-4
@@ -124,9 +124,9 @@ EXAMPLES = {
 
 
 def tolerance(model: Cascade, u: np.ndarray) -> float:
-    """1e-12 of the peak to peak of u up to a slope ratio of 1e3, beyond that 1e-15 times the ratio.
+    """1e-12 of the peak-to-peak value of u up to a slope ratio of 1e3, beyond that 1e-15 times the ratio.
 
-    And a rounding for each product and sum of either way, where plays that start far away are large beside that.
+    Plus a rounding for each product and sum, forward and inverse, which counts where plays start far away.
     """
     inputs = np.array(model.input_range)
     for stage in model.stages:
@@ -204,7 +204,7 @@ def brute_plays(pi: PI, v: np.ndarray, states: np.ndarray) -> np.ndarray:
 
 
 def reference_signal(model: Cascade, seed: int) -> np.ndarray:
-    """A reference that some drive inside the range gives: the brute-force output of a wandering drive."""
+    """A reference within reach: the brute-force output of a drive that wanders inside the range."""
     rng = np.random.default_rng(seed)
     low, high = model.input_range
     drive = np.interp(np.linspace(0, 40, 600), np.arange(41), rng.uniform(low, high, 41))
@@ -248,12 +248,12 @@ turns = st.lists(st.floats(-1, 1), min_size=2, max_size=20)
 
 
 def summed(pi: PI) -> float:
-    """Roundings of a sum over all plays, as a share of its terms: one in each state and product, and the additions."""
+    """Rounding error of a sum over all plays, as a share of its terms: that of each state, product and addition."""
     return (pi.n + 3) * U
 
 
 def rounding(pi: PI, v_max: float, engine: str = "corners") -> float:
-    """What the outputs of a play sum may differ by that are computed by an engine and by `PI.simulate`."""
+    """Largest difference between the outputs of a play sum computed by an engine and by `PI.simulate`."""
     return error_bounds(Cascade(pi, (), 0.0, (-v_max, v_max)), "float64", engine).forward
 
 
@@ -264,14 +264,14 @@ def reach(pi: PI) -> float:
 
 @given(virgins)
 def test_loading_curve_is_what_a_virgin_model_does(pi: PI) -> None:
-    """(22), and (23): its slope between two thresholds is a loop slope (33)."""
+    """Equations (22) and (23): its slope between two thresholds is a loop slope (33)."""
     x = np.linspace(0, 2 * reach(pi), 200)
     y = brute_plays(pi, x, np.zeros(pi.n + 1))
     np.testing.assert_allclose(pi.loading_curve(x), y, rtol=2 * summed(pi), atol=0)
     ends, virgin = np.array([*pi.thresholds, 2 * reach(pi)]), np.zeros(pi.n + 1)
     low = brute_plays(pi, 0.75 * ends[:-1] + 0.25 * ends[1:], virgin)
     high = brute_plays(pi, 0.25 * ends[:-1] + 0.75 * ends[1:], virgin)
-    # the outputs, the places that they are at (4 roundings), and the quotient
+    # errors of the outputs, of the places where they are taken (4 roundings), and of the quotient
     slopes, half = np.array(pi.slopes), np.diff(ends) / 2
     small = (summed(pi) * (low + high) + 4 * U * slopes * ends[1:]) / half + 4 * U * slopes
     assert np.all(np.abs((high - low) / half - slopes) <= small)
@@ -282,7 +282,7 @@ def test_a_loading_curve_gives_the_model_back(pi: PI) -> None:
     x = np.array([*pi.thresholds, 2 * reach(pi)])
     phi = [sum(p * max(a - r, 0) for p, r in zip(pi.weights, pi.thresholds, strict=True)) for a in x]
     back = PI.from_loading_curve(x, phi)
-    # the curve at both ends of a slope, its difference and the quotient; and a weight is that of two slopes
+    # a slope has the errors of the curve at both ends, of the difference and the quotient; a weight those of two slopes
     size = np.array(phi)
     small = summed(pi) * (size[1:] + size[:-1]) / np.diff(x) + 4 * U * np.array(pi.slopes)
     assert np.all(np.abs(np.subtract(back.weights, pi.weights)) <= small + np.concatenate([[0.0], small[:-1]]))
@@ -294,7 +294,7 @@ def test_a_smooth_loading_curve_gives_the_density_back() -> None:
     x = np.linspace(0, 5, 501)
     pi = PI.from_loading_curve(x, 0.7 * x + 2 * (x - 1 + np.exp(-x)))
     assert 0.7 < pi.weights[0] < 0.7 + 2.0 * 0.01 / 2, "up to half a step of p(0)"
-    # second differences of the exponential, which are h^2 / 12 off its derivative; of 4 values with 8 roundings
+    # second differences of the exponential, h^2 / 12 off its derivative; each is of 4 values with 8 roundings
     differences = 2 * np.exp(-x[1:-1]) * (2 * np.cosh(0.01) - 2) / 0.01**2
     np.testing.assert_allclose(np.array(pi.weights[1:]) / 0.01, differences, rtol=0, atol=4 * 8 * U * 12 / 0.01**2)
 
@@ -327,16 +327,16 @@ def test_start_states_that_are_none(start: float | list[float]) -> None:
 
 @given(virgins, turns)
 def test_width_is_that_of_the_largest_loop(pi: PI, middle: list[float]) -> None:
-    """(32), corrected: how far apart rising and falling drives of one output lie on a loop that moves every play,
-    and no history spreads them farther."""
+    """Equation (32), corrected: distance of the rising and falling drives of one output on a loop that moves every
+    play; no history makes it larger."""
     top, r = 4 * reach(pi) + 4 * pi.width, np.array(pi.thresholds)
     up = np.unique(np.concatenate([[-top, top], 2 * r - top, top - 2 * r]))  # the branches are straight in between
     rising, falling = brute_plays(pi, up, r - top), brute_plays(pi, up[::-1], top - r)[::-1]
     width = float(np.interp(0, rising, up) - np.interp(0, falling, up))
-    # as drives: both outputs and 4 roundings of an interpolation, where all plays move
+    # in drive units: errors of both outputs and 4 roundings of an interpolation, where all plays move
     small = (summed(pi) + 4 * U) * (top + r[-1])
     assert abs(width - pi.width) <= 2 * small
-    # every memory lies between the two; where the least slope is p_0 a rounding of the output counts for more
+    # every memory lies between the two branches; where the slope is p_0, rounding of the output counts for more
     course = brute_plays(pi, top * np.array(middle), np.zeros(pi.n + 1))
     earliest, latest = np.interp(course, falling, up), np.interp(course, rising, up)
     inside = np.abs(course) < min(rising[-1], -falling[0])
@@ -349,7 +349,7 @@ def test_width_is_that_of_the_largest_loop(pi: PI, middle: list[float]) -> None:
 
 @given(play_sums(), turns)
 def test_bounds_of_the_output(pi: PI, course: list[float]) -> None:
-    """Every output lies in `output_range`, that within (30), and that within (31)."""
+    """Every output lies in `output_range`, which lies within (30), which lies within (31)."""
     v_max = reach(pi)
     v = v_max * np.array(course)
     model = Cascade(pi, (), 0.0, (-v_max, v_max))
@@ -389,10 +389,10 @@ def test_models_are_lipschitz_in_input_and_thresholds(pi: PI, course: list[float
 @settings(max_examples=60)
 @given(models(), turns, st.integers(0, 2**32 - 1))
 def test_models_and_inverses_do_not_know_the_rate(model: Cascade, course: list[float], seed: int) -> None:
-    """(25), also of the inverse: samples on the way from one to the next, in order, change no bit.
+    """Equation (25), also for the inverse: samples inserted on the way from one to the next change no bit.
 
-    Two branches make a front that jumps at each reversal, and where it lands depends on the first sample after it; the
-    samples put in there are plateaus.
+    With two branches, the front jumps at each reversal to a place that depends on the first sample after it, so only
+    repeated samples are inserted.
     """
     rng = np.random.default_rng(seed)
     low, high = model.input_range
@@ -415,7 +415,7 @@ def test_models_and_inverses_do_not_know_the_rate(model: Cascade, course: list[f
 
 @given(play_sums(), turns, turns)
 def test_a_larger_sweep_wipes_out_the_smaller(pi: PI, before: list[float], after: list[float]) -> None:
-    """What happened inside a range leaves no trace once the drive has run through the range."""
+    """Moves inside a range leave no trace once the drive has run through the range."""
     v = reach(pi)
     inside = 0.9 * v * np.array(before)
     end = v * np.array(after)
@@ -429,19 +429,19 @@ def test_a_larger_sweep_wipes_out_the_smaller(pi: PI, before: list[float], after
 def test_loops_between_the_same_extremes_are_congruent(
     pi: PI, one: list[float], other: list[float], low: float, width: float
 ) -> None:
-    """Whatever went before, they differ by a shift of the output."""
+    """Loops differ only by a shift of the output, whatever went before."""
     v = reach(pi)
     loop = v * (low + min(width, 1 - low) * np.concatenate([[0, 1], np.linspace(1, 0, 9), np.linspace(0, 1, 9)]))
     found = [pi.simulate(np.concatenate([v * np.array(course), loop]))[-18:] for course in (one, other)]
-    # of two outputs each, and of their difference
+    # errors of two outputs each, and of their difference
     small = 2 * rounding(pi, v) + 2 * U * np.ptp(found)
     np.testing.assert_allclose(found[0] - found[0][0], found[1] - found[1][0], rtol=0, atol=small)
 
 
 @given(virgins, virgins, turns)
 def test_compensation_with_a_wrong_inverse_is_a_play_sum(pi: PI, estimate: PI, course: list[float]) -> None:
-    """Play sums form a group whose product is that of the loading curves, so that what the wrong inverse leaves is
-    known: the play sum of the curve `phi o phi_hat^-1`, the polygon through its corners."""
+    """Play sums form a group whose product is composition of loading curves, so the result of a wrong inverse is known:
+    it is the play sum of the curve `phi o phi_hat^-1`, the polygon through its corners."""
     corners = np.unique(np.concatenate([[0.0], pi.thresholds[1:], estimate.thresholds[1:]]))
     corners = np.concatenate([corners, [2 * corners[-1] + 1]])
 
@@ -453,13 +453,13 @@ def test_compensation_with_a_wrong_inverse_is_a_play_sum(pi: PI, estimate: PI, c
     left = PI.from_loading_curve(wanted, got)
     u = 1.2 * wanted[-1] * np.array(course)
     y = brute_plays(pi, estimate.inverse().simulate(u), np.zeros(pi.n + 1))
-    # the drive: the inverse's weights and thresholds have 3 roundings each; its output is then computed
+    # errors of the drive: of the inverse's weights and thresholds, 3 roundings each, and of its computed output
     inverse, most = estimate.inverse(), np.abs(u).max()
     lift = np.abs(inverse.weights) @ (most + np.array(inverse.thresholds))
     small = pi.slopes[-1] * (rounding(inverse, most) + 6 * U * lift) + summed(pi) * np.abs(pi.weights) @ (
         1.2 * corners[-1] + np.array(pi.thresholds)
     )
-    # the other play sum: its curve at the corners, twice of which counts for every turn, and its output
+    # errors of the other play sum: of its curve at the corners, counted twice for every turn, and of its output
     curves = summed(pi) * got[-1] + summed(estimate) * max(left.slopes) * wanted[-1]
     small += 2 * len(u) * 2 * curves + summed(left) * np.abs(left.weights) @ (most + np.array(left.thresholds))
     np.testing.assert_allclose(y, brute_plays(left, u, np.zeros(left.n + 1)), rtol=0, atol=small)
@@ -517,7 +517,7 @@ def test_breaks_that_only_the_descending_branch_reaches_count() -> None:
 
 
 def test_a_map_that_falls_outside_the_range_is_used_inside() -> None:
-    """Segments are judged inside the range, and beyond it the forward map is still the map."""
+    """Segments are judged inside the range only; beyond it, the forward map still follows the model."""
     stage = DeadZone([0, 1, 3], [-1, 2, 0.5])
     model = Cascade(PI([0, 0.5], [1.0, 0.5]), (stage,), 0.0, (2.0, 5.0))
     assert model.inverse_problems() == []
@@ -553,7 +553,7 @@ def test_decimal_states_of_a_history_are_no_projection() -> None:
 
 
 def _sum_of_terms(stage: DeadZone, x: float) -> float:
-    """(41), term by term, rounded once."""
+    """Equation (41), summed term by term and rounded once."""
     terms = []
     for rho, eta in zip(stage.thresholds, stage.weights, strict=True):
         terms.append(eta * (max(x - rho, 0.0) if rho > 0 else min(x - rho, 0.0) if rho < 0 else x))
@@ -568,7 +568,7 @@ def _sum_of_terms(stage: DeadZone, x: float) -> float:
 def test_dead_zone_sums_are_those_of_their_terms(
     places: list[float], weights: list[float], low: float, width: float
 ) -> None:
-    """To the last bit, also at the breaks, and what is kept from one call to the next is of the same range."""
+    """The sums agree to the last bit, also at the breaks, and values kept between calls belong to the same range."""
     thresholds = sorted({0.0, *places})
     stage = DeadZone(thresholds, weights[: len(thresholds)])
     high = low + width

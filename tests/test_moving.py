@@ -1,4 +1,4 @@
-"""The input of plays that an effect moves or bends, as a search finds it: against exact sums, and in how many tries."""
+"""The search for the input of plays that an effect moves or bends: its answers against exact sums, and its tries."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FARTHEST = 2**31 - 1
 
 
 def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
-    """A sum over whole inputs that rises steadily in each of some pieces, and jumps between them."""
+    """A sum over integer inputs that rises linearly in each of several pieces and may jump between them."""
     at = sorted(rng.integers(-FARTHEST, FARTHEST, kinks).tolist())
     slopes = [round(1000.0 * x) for x in np.exp(rng.uniform(0.0, 7.0, kinks + 1)).tolist()]
     jumps = [round(x) for x in (rng.random(kinks) < 0.2) * rng.uniform(0, 2**40, kinks)]
@@ -41,7 +41,7 @@ def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
 
 
 def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: int = 0) -> tuple[int, int]:
-    """The answer of a search in fixed point, and its tries."""
+    """The answer of a search in fixed point, and its number of tries."""
     tries = [0]
 
     def sum_at(_: Any, state: Any, w: int) -> int:
@@ -80,7 +80,7 @@ def test_a_search_in_fixed_point_ends_at_the_nearer_neighbour(seed: int) -> None
 
 
 def test_slopes_of_no_use_cost_a_search_all_its_tries() -> None:
-    """A sum that jumps from flat to flat: secants creep, and halving ends at the jump."""
+    """The sum jumps between two flat parts: secants advance slowly, and bisection ends at the jump."""
     counts = []
     for jump in (12345, -(2**30), 2**31 - 5):
         answer, tries = found_in(lambda w, jump=jump: w + 2**50 * (w > jump), -(2**31) + 1, 2**40, 2**49)
@@ -90,7 +90,7 @@ def test_slopes_of_no_use_cost_a_search_all_its_tries() -> None:
 
 
 def test_a_sum_that_is_near_ends_a_search_in_fixed_point() -> None:
-    """Half the least slope is nearer than either neighbour."""
+    """A sum within half the least slope is closer than at either neighbour, so the search ends at once."""
     answer, tries = found_in(lambda w: 1000 * w, 0, 1000, 1000 * 77 + 499, 500)
     assert (answer, tries) == (77, 2)
     answer, tries = found_in(lambda w: 1000 * w, 0, 1000, 1000 * 77 + 499, 498)
@@ -113,7 +113,7 @@ def test_quotients_are_exact_to_a_part_in_2_28() -> None:
 # ---------------------------------------------------------------- thresholds by rate, in floating point
 
 BETAS = (3.0e-4, 0.0, 1.0e-4, 4.0e-4, 2.0e-4)
-"""In no order, so that plays start in no order either."""
+"""Unsorted, so that plays do not start to move in order either."""
 
 
 def dilated() -> Model:
@@ -123,7 +123,7 @@ def dilated() -> Model:
 
 
 class Exact:
-    """Plays whose thresholds grow with the move, in fractions: the state of a compensator's, and its constants."""
+    """Plays whose thresholds grow with the move, in fractions, with the state and constants of a compensator."""
 
     def __init__(self, t: Any, s: Any) -> None:
         self.r, self.p, self.wider, self.play = (
@@ -139,19 +139,19 @@ class Exact:
         return found
 
     def kinks(self) -> list[Fraction]:
-        """Inputs at which a play begins or ends to be drawn along, either way."""
+        """Inputs at which a play starts or stops moving with the input, in either direction."""
         x, found = self.play[0], [self.play[0]]
         for r, wider, q in list(zip(self.r, self.wider, self.play, strict=True))[1:]:
             for side in (1, -1):  # which end of the play's band is at q
-                for way in (1, -1):  # of the input
-                    slope = way - side * wider  # of that end over the move's size
+                for way in (1, -1):  # direction of the input
+                    slope = way - side * wider  # of that end, per unit of the move
                     move = (q - x + side * r) / slope if slope else Fraction(-1)
                     if move > 0:
                         found.append(x + way * move)
         return sorted(found)
 
     def solved(self, h: Fraction, ends: tuple[Fraction, Fraction]) -> Fraction:
-        """The input, from the kinks around it."""
+        """The input with the sum h, interpolated between the kinks around it."""
         at = [ends[0], *(k for k in self.kinks() if ends[0] < k < ends[1]), ends[1]]
         totals = [self.total(k) for k in at]
         assert all(a < b for a, b in pairwise(totals))
@@ -163,8 +163,8 @@ class Exact:
 def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
     arithmetic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Sums that are reached where a play starts, and one unit in the last place to either side, from wherever drives
-    have left the plays. Newton's method gets there without halving."""
+    """The sums are those reached where a play starts, and one unit in the last place to either side, from wherever
+    drives have left the plays. Newton's method finds the input without bisection."""
     counts = [0]
     reciprocal = moving_float.inverse.py_func
 
@@ -189,7 +189,7 @@ def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
             u = np.array([rng.uniform(-8.0, 8.0) * rng.choice([1.0, 0.1])], real)
             code.run(t, s, call, u, np.zeros(1, real), status)
             if k < 2:
-                continue  # at rest, or about to be moved for the first time
+                continue  # plays are at rest, or about to be moved for the first time
             exact = Exact(t, s)
             for kink in exact.kinks():
                 at = real(float(exact.total(kink)))

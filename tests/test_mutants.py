@@ -1,4 +1,4 @@
-"""The records of `verify` find faults that are put in the templates and the run time."""
+"""The records of `verify` find faults that are planted in the templates and the run time."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from hystgen.verification.report import Report
 pytestmark = pytest.mark.thorough
 
 BUILD = (("quick", ["-std=c99", "-O0", "-ffp-contract=off"]),)
-"""The build that takes the least time together with its calls."""
+"""The build that is fastest to compile and run."""
 
 LENGTH = 20_000
-"""Calls of each record, a fifth of what `verify` takes by default."""
+"""Calls in each record, a fifth of the default of `verify`."""
 
 SOURCES = {name: runtime.data_folder(name) for name in ("templates", "c_runtime", "hystgen/effects")}
-"""What is emitted from, by its place in the checkout."""
+"""Folders from which C is emitted, by their place in the checkout."""
 
 
 @functools.cache
@@ -50,7 +50,7 @@ def model(name: str) -> Model:
 
 @pytest.fixture
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A copy of templates and run time that everything is emitted from."""
+    """A copy of templates and run time from which everything is emitted."""
     for name, folder in SOURCES.items():
         shutil.copytree(folder, tmp_path / name, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     monkeypatch.setattr(runtime, "data_folder", lambda name: tmp_path / name)
@@ -61,7 +61,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def forget() -> None:
-    """What has been read of the sources."""
+    """Clear the caches of what has been read from the sources."""
     runtime._environment.cache_clear()
     runtime._read.cache_clear()
     runtime._pieces_of.cache_clear()
@@ -84,7 +84,7 @@ def verify(name: str, arithmetic: str, engine: str) -> Report:
 
 @functools.cache
 def stands(name: str, arithmetic: str, engine: str) -> None:
-    """A model passes without a mutant."""
+    """Check that a model passes without a mutant."""
     report = verify(name, arithmetic, engine)
     assert report.ok, report.table()
 
@@ -97,7 +97,7 @@ def apply(mutant: Mutant, folder: Path) -> None:
 
 
 def finds(mutant: Mutant, folder: Path) -> None:
-    """The model passes as it stands, and with the mutant differs from the reference."""
+    """Check that the model passes as it stands and differs from the reference with the mutant."""
     stands(mutant.model, mutant.arithmetic, mutant.engine)
     apply(mutant, folder)
     forget()
@@ -125,7 +125,7 @@ def test_an_equivalent_mutant_changes_nothing(mutant: Mutant, sources: Path) -> 
 
 
 ADDED = re.compile(r"(\*?[\w>-]*(?:status|bits)) \|= ([^;]+);")
-"""Status bits that are added."""
+"""Statements that add status bits."""
 
 
 @pytest.mark.slow(one_in=3)
@@ -133,8 +133,8 @@ ADDED = re.compile(r"(\*?[\w>-]*(?:status|bits)) \|= ([^;]+);")
 def test_verify_sees_that_status_bits_stay(
     name: str, arithmetic: str, engine: str, alone: set[tuple[str, str]], tmp_path: Path
 ) -> None:
-    """Every place that adds status bits, made to drop those that have not been read yet; all but `alone` are found.
-    One build, in which a number chooses the place."""
+    """Each place that adds status bits is made to drop bits not read yet; all places but `alone` are found. There is
+    one build, in which a number chooses the place."""
     one = model(name)
     written = verified.write(tmp_path, one, emit_options(one, "both", arithmetic, engine))
     (path,) = written.module

@@ -1,4 +1,4 @@
-"""Hysteresis that is no play sum is said first, and told apart from what depends on time; calm and wild inverses."""
+"""Hysteresis that is not a play sum is reported first and told apart from effects of time; calm and wild inverses."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def drifting(v: Array) -> Array:
 
 
 def records(stage: Stage, speeds: tuple[float, ...], seed: int = 3) -> list[Record]:
-    """Four records of moves between random turns, each at one of the speeds, drive units per second."""
+    """Four records of moves between random turns, each move at one of the speeds, in drive units per second."""
     rng, made = np.random.default_rng(seed), []
     for number in range(4):
         turns = [0.0, 100.0, 0.0, 100.0, *rng.uniform(0.0, 100.0, 12)]
@@ -116,7 +116,7 @@ def test_plants_that_are_no_play_sum(stage: Stage, speeds: tuple[float, ...]) ->
 
 @pytest.mark.parametrize("stage", [plays, creeping, lagging, drifting])
 def test_play_sums_with_what_depends_on_time_are_play_sums(stage: Stage) -> None:
-    """At speeds that differ the drive's way does not do what time does."""
+    """At several speeds, the distance that the drive travels cannot stand in for time."""
     assert forgetting.forgets(*searched(records(stage, (400.0, 1600.0)))) is None
 
 
@@ -153,11 +153,11 @@ def test_at_one_speed_right_names_stand(stage: Stage, name: str) -> None:
     assert all(each["kind"] != "not_a_play_sum" for each in found.content["unexplained"])
 
 
-# Each inverse in front of the other model --------------------------------------------------------------------
+# The inverse of each model in front of the other -------------------------------------------------------------
 
 
 def crossed(time_constant: float) -> harm.Wild | None:
-    """What is said of a lag of this time constant, with what the right one explains, on a stage that lags by 10 ms."""
+    """Verdict on a lag of this time constant, given the gain of the right one, on a stage that lags by 10 ms."""
     made = records(lagging, (400.0, 1600.0))
     ready = preparing.prepare(made[:3], made[3:], None, 0.0)
     gain = float(np.std(lagging(np.asarray(made[3].v)) - plays(np.asarray(made[3].v))))

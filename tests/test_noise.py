@@ -1,4 +1,4 @@
-"""The noise gain of the emitted inverse, and the averages that hold it: measured on the bit reference itself."""
+"""The noise gain of the emitted inverse and the averages that limit it, measured on the bit reference itself."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def compiled(one: Model, arithmetic: str = "float64") -> Compiled:
 
 
 def measured(one: Model) -> float:
-    """The largest gain from a small impulse on a ramp to the drive, over that of the plays, which all follow there."""
+    """Largest gain from a small impulse on a ramp to the drive, relative to that of the plays, all of which move."""
     numbers = compiled(one)
     n = 400
     u = np.linspace(-7.0, 7.5, n)
@@ -53,7 +53,7 @@ def measured(one: Model) -> float:
     moved[330] += 1e-6
     with jit.plain():
         plain, other = (answers(numbers, Run(np.arange(n) * T, each, {}), True) for each in (u, moved))
-    end = n - 8  # then the reference stops and repeats its last sample
+    end = n - 8  # after it the reference stops and repeats its last sample
     assert np.max(np.abs(plain[:end])) < 4.0, "nothing is limited"
     gain = np.abs(np.fft.rfft((other - plain)[:end], 1 << 15)) / 1e-6
     return float(np.max(gain)) * one.cascade.pi.slopes[-1]
@@ -81,7 +81,7 @@ def test_the_printed_gain_is_the_largest_of_the_bit_reference(effects: tuple[str
 
 
 def rows(times: int, width: float, centred: bool) -> np.ndarray[Any, Any]:
-    """Averages of a unit box of `width`, by their definition: how much of it falls into each sample."""
+    """Weights of `times` averages over a box of `width`, by definition: the share of the box in each sample."""
     low = -0.5 * width if centred else -0.5
     cells = np.arange(-30, 31)
     one = np.clip(np.minimum(low + width, cells + 0.5) - np.maximum(low, cells - 0.5), 0.0, None) / width
@@ -101,7 +101,7 @@ def rows(times: int, width: float, centred: bool) -> np.ndarray[Any, Any]:
     ],
 )  # fmt: skip
 def test_no_narrower_averages_hold_the_gain(effects: tuple[str, ...], limit: float, preview: int | None) -> None:
-    """Against all widths in steps of 0.05, with responses by the spectrum of their weights."""
+    """Compared with all widths in steps of 0.05, whose responses are the spectra of their weights."""
     one = compiled(model(*effects, noise_gain=limit, preview=preview))
     plain = compiled(model(*effects))
     found = one.smoothing
@@ -123,7 +123,7 @@ def test_no_narrower_averages_hold_the_gain(effects: tuple[str, ...], limit: flo
 
 @pytest.mark.parametrize("preview", [None, 0, 1, 4, 30])
 def test_the_motion_is_as_late_as_printed(preview: int | None) -> None:
-    """On a ramp, against the motion without averages."""
+    """On a ramp, the delay is measured against the motion without averages."""
     effects = LAG, MODE.replace("0.05", "0.5")
     one = model(*effects, noise_gain=40.0, preview=preview)
     numbers = compiled(one)
@@ -158,7 +158,7 @@ def test_a_sine_loses_what_is_printed(period: int, loss: str) -> None:
 @pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_averages_have_the_bits_and_the_bounds_of_the_rest(arithmetic: str) -> None:
-    """Against the compensator in double precision, to which the averaged reference is given."""
+    """Errors are taken against the compensator in double precision, given the averaged reference."""
     one = model(DELAY, MODE, CREEP, noise_gain=7.3)
     with jit.plain():
         report = hystgen.verify(one, arithmetic, compiler=["gcc"], length=150)
@@ -205,7 +205,7 @@ STAGE = "  pi: {thresholds: [0, 5, 10], weights: [0.1, 0.02, 0.01]}\n  effects:\
 
 
 def of(*effects: str, seconds: str = "1.0e-3", front: str = "", emit: str = "") -> Model:
-    """A model with a slope of 0.1 um/V behind a turn; `front`: of its drive; `emit`: that section."""
+    """A model with a slope of 0.1 um/V after a turn; `front` and `emit` are further lines of its file."""
     listed = "".join(f"    - {{{effect}}}\n" for effect in effects)
     return Model(parse_parameters(HEAD % seconds + front + STAGE + listed + emit, "noisy.yaml"))
 
@@ -221,7 +221,7 @@ def told(one: Model, **options: Any) -> list[str]:
 
 
 def shown_noise(one: Model, arithmetic: str, size: float) -> float:
-    """Rms noise of the drive, V, for one of `size` um at half the sample rate on a reference at rest behind a turn."""
+    """Rms noise of the drive in V for noise of `size` um at half the sample rate, on a still reference after a turn."""
     numbers = compiled(one, arithmetic)
     drive, output = (float(x.drive_lsb), float(x.output_lsb)) if (x := numbers.codes) else (1.0, 1.0)
     u = np.concatenate([np.linspace(3.0, 7.0, 100), np.linspace(7.0, 6.8, 50), np.full(450, 6.8)])
@@ -234,7 +234,7 @@ def shown_noise(one: Model, arithmetic: str, size: float) -> float:
 
 @pytest.mark.parametrize("arithmetic", ["float64", "q31"])
 def test_the_figure_of_the_noise_is_that_of_the_drive(arithmetic: str) -> None:
-    """A sine at the stated frequency, small enough for the plays to stand, gives the stated drive."""
+    """A sine at the stated frequency, small enough not to move the plays, gives the stated noise of the drive."""
     one = of("name: lag, time_constant: 0.004")
     (said, *_) = told(one, arithmetic=arithmetic)
     found = re.match(
@@ -246,11 +246,11 @@ def test_the_figure_of_the_noise_is_that_of_the_drive(arithmetic: str) -> None:
     gain, hertz, size = (float(found[k]) for k in (1, 2, 3))
     decay = math.exp(-1.0 / 4.0)
     theta = 4.0 - decay / (1.0 - decay)
-    assert gain == pytest.approx((1.0 + 2.0 * theta) * (1.0 + decay) / (1.0 - decay), rel=5e-3)  # the lead's, by hand
+    assert gain == pytest.approx((1.0 + 2.0 * theta) * (1.0 + decay) / (1.0 - decay), rel=5e-3)  # of the lead, by hand
     assert hertz == 500.0
     form = compiled(one, arithmetic).codes
     drive = float(found[4]) if form is None else float(form.drive_lsb)
-    scale = 0.5 / drive  # to half a volt, for which the plays stand
+    scale = 0.5 / drive  # to half a volt, which does not move the plays
     assert shown_noise(one, arithmetic, scale * size) == pytest.approx(0.5, rel=1e-2)
 
 
@@ -283,7 +283,7 @@ def test_more_noise_than_anyone_wants_has_to_be_allowed() -> None:
     ],
 )  # fmt: skip
 def test_effects_that_are_over_within_a_sample_are_told(effect: str) -> None:
-    """Just below a 50th of a sample, but not above, nor beside an effect that is slow."""
+    """Effects just below a 50th of a sample are reported; slower effects, or those next to a slow one, are not."""
     (said,) = (each for each in told(of(effect, seconds="50.0")) if each.startswith("Effects are over"))
     name = effect.partition(",")[0].removeprefix("name: ")
     assert f"the slowest, {name}, takes 0.9" in said
@@ -318,6 +318,6 @@ def test_sizes_of_codes_are_refused_where_there_are_no_codes(tmp_path: Path) -> 
     assert CliRunner().invoke(main, ["show", str(path)]).exit_code == 0
     emitted_files(hystgen.load(path), arithmetic="q15")
     quiet = "emit: {drive_lsb: 0.1, compensation: {quiet: true}}\n"
-    emit_options(of("name: lag, time_constant: 0.002", emit=quiet))  # the step of its converter
+    emit_options(of("name: lag, time_constant: 0.002", emit=quiet))  # drive_lsb is the step of its converter
     with pytest.raises(FormatError, match=r"emit\.drive_lsb: is the size of a code, and float32 has no codes"):
         emit_options(of("name: lag, time_constant: 0.002", emit=quiet), operator="forward")

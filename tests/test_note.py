@@ -27,7 +27,7 @@ from hystgen.plays import elastoplastic, operators
 ROOT = Path(__file__).resolve().parents[1]
 GALLERY = ROOT / "examples" / "note"
 PAGE = ROOT / "docs" / "note.md"
-U = 2.0**-53  # what one rounding may add, as a share of its result
+U = 2.0**-53  # largest error of one rounding, as a share of its result
 
 
 def rows(title: str, columns: int) -> list[list[str]]:
@@ -144,7 +144,7 @@ class TestGallery:
 def test_the_inverse_dead_zone_sum_undoes_the_sum(
     left: list[tuple[float, float]], right: list[tuple[float, float]], slope: float, v: list[float]
 ) -> None:
-    """(53)-(56) on each side of its own, by summing dead zones as (41)(42) and (50)(51) have it."""
+    """Equations (53)-(56) on each side of zero, with dead zones summed as in (41), (42), (50) and (51)."""
     rho, eta = [0.0], [slope]
     for sign, side in ((-1.0, left), (1.0, right)):
         place, last = 0.0, slope
@@ -165,8 +165,8 @@ def test_the_inverse_dead_zone_sum_undoes_the_sum(
 
     drives = np.array(v)
     w = summed(zone, drives)
-    # sums of one term a dead zone, each of a few roundings: the sum's own, which the inverse scales by its slopes at
-    # most, those of tau, which are such sums too, and the inverse's
+    # sums with one term per dead zone, each of a few roundings: errors of the sum, which the inverse scales by at most
+    # its slopes, of tau, which are such sums too, and of the inverse
     there = np.abs(zone.weights) @ (np.max(np.abs(drives)) + np.abs(zone.thresholds))
     back = np.abs(inverse.weights) @ (np.max(np.abs(w)) + np.abs(inverse.thresholds))
     small = (len(rho) + 8) * U * (2 * there * np.abs(inverse.weights).sum() + back)
@@ -179,10 +179,10 @@ def off(found: object, expected: object) -> float:
 
 
 class TestMisprints:
-    """What is printed, computed as it is printed, and the numbers of docs/note.md."""
+    """Printed formulas, computed as they are printed, give the numbers that docs/note.md states."""
 
     T = np.linspace(0, 2, 2001)
-    v = np.round((1 + 3 * np.sin(2 * np.pi * T)) * 2**20) / 2**20  # whose sums are not rounded
+    v = np.round((1 + 3 * np.sin(2 * np.pi * T)) * 2**20) / 2**20  # so that sums are not rounded
 
     @pytest.fixture
     def errata(self, request: pytest.FixtureRequest) -> str:

@@ -1,4 +1,4 @@
-"""Operators and memory against brute force and against the identities of the literature."""
+"""Operators and memory, compared with brute force and with identities of the literature."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from hystgen.plays import elastoplastic, operators, play_sum
 
 U = 2.0**-53
-"""What one rounding of a double changes at most, relatively."""
+"""Largest relative error of one rounding of a double."""
 
 TINY = 5e-324
-"""What a product of numbers near zero may lose instead."""
+"""Largest absolute error of a product near zero, where the relative one does not hold."""
 
 numbers = st.floats(-10, 10)
 signals = st.lists(numbers, min_size=1, max_size=60)
@@ -33,7 +33,7 @@ def brute_play(v: list[float], r: float, start: float) -> list[float]:
 
 
 def stop_roundings(v: ArrayLike, r: float) -> NDArray[np.float64]:
-    """Two sums per sample, of a state up to r, the sample and the one before; clipping lets them add up as they are."""
+    """Rounding error of two sums per sample, of a state up to r, the sample and the one before; clipping adds none."""
     size = np.abs(v)
     return np.asarray(U * np.cumsum(2 * r + 2 * size + np.concatenate([[0.0], size[:-1]])))
 
@@ -47,22 +47,22 @@ def test_play_is_its_recursion(v: list[float], r: float, start: float) -> None:
 def test_stop_and_play_add_up_to_the_input(v: list[float], r: float, start: float) -> None:
     stop = operators.stop(v, r, start)
     off = np.abs(stop + operators.play(v, r, start) - v)
-    assert np.all(off <= stop_roundings(v, r) + 3 * U * (np.max(np.abs(v)) + r))  # of the play, and two here
+    assert np.all(off <= stop_roundings(v, r) + 3 * U * (np.max(np.abs(v)) + r))  # rounding of the play, and two here
     assert np.all(np.abs(stop) <= r)
 
 
 @given(signals, radii, numbers)
 def test_play_stays_within_its_threshold_of_the_input(v: list[float], r: float, start: float) -> None:
-    """(27), and (28) which follows."""
+    """Equation (27), and (28), which follows from it."""
     s = operators.play(v, r, start)
-    assert np.all(np.abs(np.array(v) - s) <= r + 3 * U * (np.abs(v) + r))  # of the play, and two here
-    assert np.max(np.abs(s)) <= np.max(np.abs(v)) + r  # which is rounded as the play is
+    assert np.all(np.abs(np.array(v) - s) <= r + 3 * U * (np.abs(v) + r))  # rounding of the play, and two here
+    assert np.max(np.abs(s)) <= np.max(np.abs(v)) + r  # the right side is rounded as the play is
 
 
 @given(signals, radii, numbers, st.integers(0, 2**32 - 1))
 def test_rate_independence(v: list[float], r: float, start: float, seed: int) -> None:
-    """(24): any number of samples anywhere on the way from one sample to the next, in order, or each of them several
-    times, changes nothing."""
+    """Equation (24): samples inserted anywhere on the way from one sample to the next, in order, or repeated, change
+    nothing."""
     rng = np.random.default_rng(seed)
     course, kept = [v[0]], [0]
     for a, b in pairwise(v):
@@ -79,19 +79,19 @@ def test_rate_independence(v: list[float], r: float, start: float, seed: int) ->
 def test_play_is_lipschitz_in_input_and_start(
     pairs: list[tuple[float, float]], r: float, start: float, other: float
 ) -> None:
-    """(3), at every time with what has been up to it; a difference of the starts counts like one of the inputs."""
+    """Equation (3), at each time with the inputs up to it; a difference of starts counts like one of inputs."""
     v, w = np.array(pairs).T
     most = np.maximum.accumulate(np.maximum(np.abs(v - w), abs(start - other)))
-    rounded = U * (np.max(np.abs(pairs)) + r)  # of each play; here, of both differences and the last sum
+    rounded = U * (np.max(np.abs(pairs)) + r)  # of each play; 3 U: both differences and the last sum here
     s, t = operators.play(v, r, start), operators.play(w, r, other)
     assert np.all(np.abs(s - t) <= most + 2 * rounded + 3 * U * most)
 
 
 @given(signals, radii, radii, numbers)
 def test_play_is_lipschitz_in_the_threshold(v: list[float], r: float, other: float, start: float) -> None:
-    """With constant one: what makes a memory admissible."""
+    """The constant is one, which is what makes a memory admissible."""
     s, t = operators.plays(v, [r, other], start)
-    rounded = U * (2 * np.max(np.abs(v)) + r + other)  # of both plays; here, of both differences and the last sum
+    rounded = U * (2 * np.max(np.abs(v)) + r + other)  # of both plays; 3 U: both differences and the last sum here
     assert np.all(np.abs(s - t) <= abs(r - other) + rounded + 3 * U * abs(r - other))
 
 
@@ -99,19 +99,19 @@ def test_play_is_lipschitz_in_the_threshold(v: list[float], r: float, other: flo
 def test_the_start_is_forgotten_after_a_sweep_of_twice_the_threshold(
     v: list[float], r: float, start: float, other: float, centre: float
 ) -> None:
-    """From the first sample on at which the input's range so far is 2 r, to the last bit; less is not enough."""
+    """Outputs agree to the last bit once the input's range reaches 2 r; a smaller range is not enough."""
     ends = zip(np.minimum.accumulate(v), np.maximum.accumulate(v), strict=True)
     swept = np.array([Fraction(high) - Fraction(low) >= 2 * Fraction(r) for low, high in ends])
     s, t = operators.play(v, r, start), operators.play(v, r, other)
     np.testing.assert_array_equal(s[swept], t[swept])
     short = centre + 0.999 * np.array([-r, r, -r, r])
     s, t = operators.play(short, r, centre - 9 * r), operators.play(short, r, centre + 9 * r)
-    assert np.all(t - s >= 0.002 * r - 10 * U * (abs(centre) + 2 * r))  # four of each, and two here
+    assert np.all(t - s >= 0.002 * r - 10 * U * (abs(centre) + 2 * r))  # four roundings of each play, and two here
 
 
 @given(signals, st.one_of(st.just(0.0), st.floats(-8, 8)))
 def test_dead_zone_is_what_lies_beyond_its_threshold(v: list[float], rho: float) -> None:
-    """(42), case by case."""
+    """Equation (42), case by case."""
     expected = [x if rho == 0 else x - rho if 0 < rho < x or x < rho < 0 else 0.0 for x in v]
     assert operators.dead_zone(v, rho).tolist() == expected
 
@@ -121,10 +121,10 @@ positive = st.floats(0.05, 20)
 
 @given(signals, positive, radii, st.floats(-1, 1))
 def test_parallel_element(stress: list[float], modulus: float, r: float, strain: float) -> None:
-    """The relations (7)-(10) of every step, which have one solution, and the play that it is (12)."""
+    """Every step satisfies the relations (7)-(10), which have one solution: the play of (12)."""
     found = elastoplastic.parallel(stress, modulus, r, strain)
-    # Of up to `size` a step rounds two products and the strain, of twice as much the trial, the excess and its strain:
-    # together nine times; the play rounds once, its start once, the sum here once
+    # In units of `size`, a step rounds two products and the strain, and the trial, the excess and its strain, which are
+    # twice as large: nine in all; the play, its start and the sum here round once each
     size = max(modulus * abs(strain), np.max(np.abs(stress)) + r)
     small = 12 * (U * size + (1 + modulus) * TINY)
     np.testing.assert_allclose(found.elastic_stress + found.plastic_stress, stress, rtol=0, atol=small)
@@ -138,9 +138,9 @@ def test_parallel_element(stress: list[float], modulus: float, r: float, strain:
 
 @given(signals, positive, radii, st.floats(-1, 1))
 def test_series_element(strain: list[float], modulus: float, r: float, plastic: float) -> None:
-    """The relations (13)-(16) of every step, which have one solution, and the stop that it is (17)."""
+    """Every step satisfies the relations (13)-(16), which have one solution: the stop of (17)."""
     found = elastoplastic.series(strain, modulus, r, plastic)
-    # As above, with a trial that rounds twice, and thrice in what the stop is given; what it adds up comes on top
+    # As above, with a trial that rounds twice and three roundings in the stop's input; the stop's own sums come on top
     size = max(modulus * abs(plastic), modulus * np.max(np.abs(strain)) + r)
     small = 16 * (U * size + (1 + modulus) * TINY)
     total = found.elastic_strain + found.plastic_strain
@@ -156,7 +156,7 @@ def test_series_element(strain: list[float], modulus: float, r: float, plastic: 
 @settings(max_examples=50)
 @given(st.lists(numbers, min_size=1, max_size=8), positive, radii, st.floats(-1, 1))
 def test_elements_take_the_least_energy(load: list[float], modulus: float, r: float, plastic: float) -> None:
-    """Of all strains of the slider the one that costs least, stored in the spring and lost in the slider."""
+    """Each element takes the slider strain of least energy, that stored in the spring and lost in the slider."""
     under_stress = elastoplastic.parallel(load, modulus, r, plastic).strain
     under_strain = elastoplastic.series(load, modulus, r, plastic).plastic_strain
     before = plastic, plastic
@@ -169,7 +169,7 @@ def test_elements_take_the_least_energy(load: list[float], modulus: float, r: fl
             tried = np.concatenate([[found], tried, found - np.geomspace(1e-6, 1, 50)])
             parts = np.array([*energy(tried), r * np.abs(tried - last)])
             cost, rounded = np.sum(parts, axis=0), 6 * U * np.sum(np.abs(parts), axis=0)
-            # found by 12 roundings, which cost their square
+            # the strain found has 12 roundings, whose cost is quadratic
             missed = (12 * U * max(modulus * abs(plastic), size + r)) ** 2 / (2 * modulus) + 12 * (1 + modulus) * TINY
             assert np.all(cost[0] - cost <= rounded[0] + rounded + missed)
         before = under_stress[k], under_strain[k]
@@ -198,9 +198,9 @@ def test_projected_memory_is_admissible(requested: list[float]) -> None:
     thresholds = [0, 0.5, 1, 2, 4]
     states, moved = play_sum.project(requested, thresholds)
     size = max(4.0, *map(abs, requested))
-    assert play_sum.is_admissible(states, thresholds, 3 * U * size)  # of a sum, and of a difference of two
+    assert play_sum.is_admissible(states, thresholds, 3 * U * size)  # rounding of a sum, and of a difference of two
     assert states[1] == requested[1]
-    if not moved:  # but by the eight units in the last place that decimal numbers may miss their sums by
+    if not moved:  # up to the eight units in the last place by which decimal numbers may miss their sums
         np.testing.assert_allclose(states[1:], requested[1:], rtol=0, atol=16 * U * size)
     assert play_sum.project(states, thresholds)[0] == states
 

@@ -1,4 +1,4 @@
-"""Stated error bounds, limits and status bits of the compiled C against an exact model that shares nothing with it."""
+"""Error bounds, limits and status bits of the compiled C, checked with an exact model that shares no code with it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = [
 ]
 
 MODELS = int(os.environ.get("HYSTGEN_ORACLE_MODELS", "300"))
-"""Random models of a run; `make check-bounds` takes more."""
+"""Random models in each run; `make check-bounds` takes more."""
 
 KEPT = Path("build/oracle")
 EACH = pytest.mark.parametrize(("arithmetic", "engine"), check.COMBINATIONS)
@@ -54,7 +54,7 @@ def test_a_bound_that_is_too_small_is_noticed(arithmetic: str, engine: str, tmp_
         assert "times the bound" in finding.result.message.decode()
 
 
-# What goes wrong: the operator that shows it, a pattern in the emitted C, the text in its place
+# Faults: the operator that shows each, a pattern in the emitted C, and its replacement
 CHANGES = {
     "a pending drive is forgotten": ("inverse", r"above_inverse_(absorb|played)\(self, self->pending\);", ";"),
     "a commit is not limited": ("inverse", r"above_applied_drive\(applied\)", "applied"),
@@ -95,7 +95,7 @@ def test_a_limit_that_is_a_code_off_is_noticed(limit: str, by: int, tmp_path: Pa
 
 # Models at which stated bounds or status bits were once wrong
 ONCE_WRONG = {
-    # rounding at the kink of a flat piece ran on along the steep one behind it
+    # rounding at the end of a flat piece continued along the steep piece after it
     "flat_first": """
 hystgen: 1
 name: flat_first
@@ -103,7 +103,7 @@ input_range: [-1, 6]
 model:
   pi: {thresholds: [0, 0.4, 1.2, 2.5], weights: [0.0002, 2, 0.7, 30]}
 """,
-    # behind a reset plays are at 0, outside the hull of range and start memory; outputs exceed every code
+    # after a reset, plays are at 0, outside the hull of range and start memory; outputs exceed every code
     "reset_afar": """
 hystgen: 1
 name: reset_afar
@@ -112,7 +112,7 @@ model:
   pi: {thresholds: [0, 12, 300], weights: [0.5, 1, 2], initial_state: 60}
   output_offset: -210
 """,
-    # the start memory stands for a drive above, below and between codes: the first move takes that branch
+    # the start memory belongs to a drive above or below the range or between codes, which sets the first branch
     "above_the_range": """
 hystgen: 1
 name: above_the_range
@@ -146,7 +146,7 @@ model:
     ascending: {a0: 4, a1: 0.1, a2: -0.05, a3: 0}
     descending: {a0: 4, a1: 0.1, a2: 0, a3: 0.1}
 """,
-    # plays lie far from a range that is narrow beside their thresholds, so that rounded weights count for more
+    # plays lie far from a range that is narrow compared with their thresholds, so rounded weights count for more
     "narrow_range": """
 hystgen: 1
 name: narrow_range
@@ -154,7 +154,7 @@ input_range: [0, 0.0003]
 model:
   pi: {thresholds: [0, 0.15], weights: [1, 4.0e-5], initial_state: [0, -0.1499]}
 """,
-    # plays that never move, each with a start of its own: thresholds cut to what fits left these no room
+    # plays that never move, each with its own start: thresholds cut to fit the format left them no room
     "never_moved": """
 hystgen: 1
 name: never_moved
@@ -207,7 +207,7 @@ def test_bits_of_models_that_were_once_wrong(name: str, arithmetic: str, engine:
 
 
 EFFECTS = 6
-"""Models with effects of a run in each arithmetic; `make check-bounds` takes more, and longer ones."""
+"""Models with effects per arithmetic in each run; `make check-bounds` takes more, and longer ones."""
 
 
 @pytest.mark.parametrize("arithmetic", check.KINDS)
@@ -230,8 +230,8 @@ model:
   effects: [{name: slew_limit, rate: 0.1}]
 """
 
-# What goes wrong with a drive at a limited rate: a pattern in the emitted C, and the text in its place, with a number
-# of the arithmetic: a step that is a five hundredth too large. In fixed point every code is a number: none is held.
+# Faults of a drive at a limited rate: a pattern in the emitted C and its replacement, with a number from FASTER that
+# makes the step a five-hundredth too large. In fixed point every code is a number, so no sample is held.
 AT_A_RATE = {
     "its rounding adds up": (r"other \? 0 : self->reached\.rest", "0"),
     "it is too fast": (r"(#define M_SLEW_RISING_REST) (\S+)", r"\1 (\2 + {})"),
@@ -245,7 +245,7 @@ def test_a_drive_that_leaves_its_rate_is_noticed(arithmetic: str, tmp_path: Path
     (tmp_path / "slow.yaml").write_text(SLOW)
     case = effects.read(tmp_path / "slow.yaml", arithmetic)
     for change in ("", *(each for each in AT_A_RATE if "held" not in each or arithmetic == "float32")):
-        folder = tmp_path / (change or "right").replace(" ", "_")  # a library is loaded once from a path
+        folder = tmp_path / (change or "right").replace(" ", "_")  # each path is loaded only once
         folder.mkdir()
         assert effects.emit(case, folder)
         if change:

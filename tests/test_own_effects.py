@@ -1,4 +1,4 @@
-"""Effects of the user's own, from a folder outside of the package: simulated, diagnosed, inverted, and in the C."""
+"""User effects from a folder outside the package: simulated, diagnosed, inverted, and emitted as C."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ T = 1e-3
 DROOP = "name: user:droop, share: 0.05, time_constant: 0.7"
 Call = Callable[..., tuple[int, str, str]]
 
-# A drive stage in front of the plays, with a file of its own
+# A drive stage in front of the plays, with its own C file
 FOLDER = Path(__file__).with_name("follower")
 STAGE, STAGE_C = ((FOLDER / name).read_text() for name in ("model.py", "follower.c"))
 FOLLOWER = "name: user:follower, bandwidth: 700"
 
-# One of the catalogue, whose block is of the same kind
+# A catalogue effect whose block is of the same kind
 PART = "name: resonance, shape: part, frequency: 30, damping: 0.1, share: 0.2"
 
 
@@ -57,7 +57,7 @@ def written(folder: Path, *effects: str, name: str = "stage") -> Path:
 
 
 def outside(folder: Path, python: str = STAGE, c: str | None = STAGE_C) -> Path:
-    """A folder with an effect, which nothing in the package knows of; with other texts than those a copy."""
+    """A folder with an effect that the package does not know; a copy if its texts differ from the original."""
     if (python, c) == (STAGE, STAGE_C):
         return FOLDER
     own_folder = folder / "follower"
@@ -69,7 +69,7 @@ def outside(folder: Path, python: str = STAGE, c: str | None = STAGE_C) -> Path:
 
 
 def both(folder: Path, *more: str) -> Model:
-    """A model with an effect on either side of the plays, both from outside."""
+    """A model with an effect on either side of the plays, both from outside the package."""
     return hystgen.load(written(folder, DROOP, FOLLOWER, *more), [EXAMPLE, outside(folder)])
 
 
@@ -82,7 +82,7 @@ def reference(one: Model, arithmetic: str, seed: int, n: int = 1500) -> tuple[ta
 
 
 def test_the_forward_model_is_the_integral_of_its_equation(tmp_path: Path) -> None:
-    """Of the droop, in steps a hundredth as long."""
+    """The droop's output agrees with an integration in steps a hundredth as long."""
     one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
     t = np.cumsum(np.random.default_rng(1).uniform(0.5 * T, 2.0 * T, 400))
     v = 3.0 * np.sin(9.0 * t)
@@ -109,7 +109,7 @@ def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool)
 
 
 def test_a_drive_that_may_not_come_to_rest_is_warned_of(tmp_path: Path) -> None:
-    """Between two branches, which only the catalogue's lag arrives at from one side."""
+    """The drive may swing between two branches, which only the catalogue's lag approaches from one side."""
     path = written(tmp_path, FOLLOWER)
     path.write_text(path.read_text().replace("  output_offset", BRANCHES + "  output_offset"))
     with pytest.warns(UserWarning, match=r"may swing between them, by up to [0-9.]+ V; make the effect a lag"):
@@ -118,7 +118,7 @@ def test_a_drive_that_may_not_come_to_rest_is_warned_of(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_c_gives_the_bits_of_the_reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compiled, which the others are not."""
+    """The reference is compiled here, unlike in the other tests."""
     monkeypatch.setattr(jit, "SHORT", 0)
     report = hystgen.verify(both(tmp_path, CREEP, PART), "float32", "both", compiler=["gcc"], length=1000)
     assert report.ok, report.table()
@@ -139,7 +139,7 @@ def test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time(tmp_path: P
 
 
 def after_the_same(one: Model, u: Array, sent: Array) -> Array:
-    """Drives in double precision, each after those that were sent before."""
+    """Drives in double precision, each after the drives that were sent before it."""
     op = np.tile(np.array([slots.OP_STEP, slots.OP_COMMIT], dtype=np.uint8), len(u))
     double = tables.build(one.chain, "float64", T)
     found, _ = computed(double.tables, True, op, np.column_stack([u, sent]).ravel(), compiled=False)
@@ -183,16 +183,16 @@ FIXED = {
     "ringing part": ("name: resonance, shape: part, frequency: 60, damping: 0.01, share: 0.05",),
 }
 RINGS = 1024.0
-"""[output codes] Of a mode that rings for 265 samples, what its rounded factors make in that time is a share of it."""
+"""[output codes] Limit for a mode that rings for 265 samples, over which errors of its rounded factors add up."""
 
 
 @pytest.mark.parametrize("effects", FIXED.values(), ids=list(FIXED))
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, effects: tuple[str, ...]) -> None:
-    """Against double precision, for smooth references, jumps from one end of the output to the other, and noise.
+    """Errors are against double precision, for smooth references, jumps across the output range, and noise.
 
-    A block in front of the plays keeps a difference of two drives while both are limited to the same one: after that
-    only those are compared that have seen the same drives.
+    A block in front of the plays keeps the difference of two drives that are limited to the same value. With such a
+    block, answers are compared with those of double precision after the same drives.
     """
     one = hystgen.load(written(tmp_path, *effects), [EXAMPLE, outside(tmp_path)])
     compiled = tables.build(one.chain, arithmetic, T)
@@ -229,7 +229,7 @@ def test_c_gives_the_bits_of_the_reference_in_every_arithmetic(tmp_path: Path, a
 
 
 def test_the_noise_gain_is_that_of_an_impulse(tmp_path: Path) -> None:
-    """Without plays everything is linear."""
+    """Without plays, the whole chain is linear."""
     path = written(tmp_path, DROOP, FOLLOWER)
     path.write_text(path.read_text().replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"))
     one = hystgen.load(path, [EXAMPLE, outside(tmp_path)])
@@ -244,7 +244,7 @@ def test_the_noise_gain_is_that_of_an_impulse(tmp_path: Path) -> None:
 
 
 def test_it_is_diagnosed_and_goes_into_the_c(tmp_path: Path, run: Call) -> None:
-    """Records of plays and droop, drawn from the equation alone, by the commands of the docstring."""
+    """Records of plays and droop, made from the equation alone, go through the commands of the docstring."""
     plain = written(tmp_path, name="plain")
     plain.write_text(plain.read_text().replace("  effects:\n", ""))
     static = hystgen.load(plain)
@@ -363,7 +363,7 @@ UNTOLD = ("/*", "*/", "*", "\n", " ", "evil", ";", "x", "/**/", "?", "/*", "*/")
     not os.environ.get("CI") and shutil.which("gcc") is None, reason="the oracle is gcc's preprocessor"
 )
 def test_the_check_sees_what_a_compiler_sees(tmp_path: Path) -> None:
-    """Of texts put together at random, those that pass without a problem of a line have the comments of gcc -E."""
+    """For random texts whose lines pass the check, it strips the same comments as gcc -E."""
     rng = np.random.default_rng(0)
     texts = {"".join(rng.choice([*UNTOLD, *rng.choice(TOLD, 1)], 9)) for _ in range(4000)}
     passed = [text for text in sorted(texts) if not list(emitted_own._of_lines(text))]
@@ -377,7 +377,7 @@ def test_the_check_sees_what_a_compiler_sees(tmp_path: Path) -> None:
 
 
 def test_a_comment_stands_above_its_function_as_a_whole(tmp_path: Path) -> None:
-    """Also one with an empty line in it."""
+    """Even a comment with an empty line in it stays whole."""
     above = "/* The first half.\n\n   The second one. */\n"
     head_of = "static hystgen_signal_t hystgen_user_follower_absorb("
     assert "*/\nstatic" not in STAGE_C
@@ -431,7 +431,7 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
     assert not (tmp_path / "out").exists()
 
 
-SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
+SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # solve returns the drive itself
 ONLY_FLOAT = {
     "another input": ([SOFT], "its solve does not return the input for which absorb returns the requested output"),
     "memory": ([("    return s[0] + product", "    s[1] = y\n    return s[0] + product"),
@@ -501,7 +501,7 @@ def test_two_names_that_are_one_in_c_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("keeps", [0.5, 0.99, 0.999])
 @pytest.mark.parametrize("apart", [0.0, 1e-13, 1e-9, 1e-4])
 def test_sums_over_samples_are_no_smaller_than_they_are(keeps: float, apart: float) -> None:
-    """Two low-passes in series, alike or nearly so, against the sums themselves."""
+    """Bounds for two low-passes in series, equal or nearly so, are compared with the sums themselves."""
     a = np.array([[keeps, 0.0], [1.0 - keeps, keeps * (1.0 - apart)]])
     b, c = np.array([1.0 - keeps, 0.0]), np.array([0.3, 1.0])
     system = own.System(a, b, c, 0.0)
@@ -537,9 +537,9 @@ def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
     ],
 )
 def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: runtime.Family) -> None:
-    """Type, name and order of numbers in the headers of the run time are those that Python has declared."""
+    """Types, names and order of numbers in the run time's headers are those declared in Python."""
     text = {piece.name: piece.text for piece in runtime._pieces(family.chain_types, family.facts)}
-    inside = {"hystgen_lag_t"}  # of another block's memory, in whose place its members stand
+    inside = {"hystgen_lag_t"}  # another block's memory, replaced by its members
 
     def in_c(name: str) -> list[tuple[str, str, int]]:
         """Type, name and length of each member, 0 for no array."""
@@ -569,7 +569,7 @@ def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: runtim
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q31"])
 def test_the_memory_of_a_chain_is_named_as_in_c(arithmetic: str) -> None:
-    """Of plays, and of what a step keeps for a slew limit and a lag."""
+    """Compared are the memory of plays, and the state that a step keeps for a slew limit and a lag."""
     family = runtime.FAMILIES[arithmetic]
     text = {piece.name: piece.code for piece in runtime._pieces((*family.states, *family.chain_types), family.facts)}
     same: list[tuple[str, type[Struct]]] = [
@@ -583,7 +583,7 @@ def test_the_memory_of_a_chain_is_named_as_in_c(arithmetic: str) -> None:
 
 
 def test_a_block_says_what_it_does_to_signals() -> None:
-    """Against sums over a long record."""
+    """The figures of a block agree with sums over a long record."""
     (effect,) = load_user_effects(EXAMPLE)
     one = own.linear(effect.model_validate({"name": "user:droop", "share": 0.05, "time_constant": 0.02}), T)
     a, b, c = one.forward.a, one.forward.b, one.forward.c

@@ -1,4 +1,4 @@
-"""Work on several things in copies of this process."""
+"""Running work on several items in copies of this process."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class TestEach:
     @pytest.mark.parametrize("jobs", [1, 2])
     def test_the_first_of_several_failures_is_raised_here(self, jobs: int) -> None:
         class OwnError(Exception):
-            """One whose copy could not be made from its arguments."""
+            """An error that cannot be copied from its arguments."""
 
             def __init__(self, k: int, more: str) -> None:
                 super().__init__(f"number {k} {more}")

@@ -894,7 +894,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
         "n": draw(st.integers(1, 5)),
     }
     sizes = st.floats(0, 1e30, exclude_min=True)
-    slopes = st.floats(1e-30, 1e30)  # their product is a slope, which is to stay in bounds
+    slopes = st.floats(1e-30, 1e30)  # their product is a slope, which must stay in bounds
     branch = st.builds(lambda a0, a1, a2, a3, sign: {"a0": a0 * sign, "a1": a1 * sign, "a2": a2, "a3": a3}, slopes, slopes, numbers, numbers, st.sampled_from([1, -1]))
     dead_zones = st.lists(numbers.filter(bool), unique=True, max_size=4).map(lambda r: sorted([0.0, *r]))
     dead_zone = dead_zones.flatmap(
@@ -1107,7 +1107,7 @@ def test_schema_accepts(label: str) -> None:
 
 
 def test_schema_refuses_what_it_can_see() -> None:
-    """What the schema lets pass of the refused files is what no schema can express, and no more.
+    """The schema accepts only those refused files whose fault no schema can express.
 
     (`underscore_number` is a number to the reader used here, though not in YAML 1.2.)
     """

@@ -1,4 +1,4 @@
-"""Drives planned for a diagnosis: within their limits, the same bytes, explained, and such that effects differ."""
+"""Drives planned for a diagnosis: they keep their limits, are reproducible and explained, and tell effects apart."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.thorough
 Call = Callable[..., tuple[int, str, str]]
 
 SAMPLE = ("asymmetry", "delay", "slew_limit", "thermal")
-"""Effects that every run of the tests hides; `benchmarks.plants` says how to hide them all."""
+"""Effects hidden in every run of the tests; `benchmarks.plants` says how to hide them all."""
 
 
 def file_of(folder: Path, low: float = -20.0, high: float = 120.0, more: str = "") -> Path:
@@ -63,7 +63,7 @@ class TestLimits:
             assert drive.v.max() < high
             assert np.ptp(drive.v) > 0.9 * (high - low)
             steps = np.diff(drive.t)
-            # the smallest step and the largest change that the printed decimals may stand for
+            # with the smallest time step that the printed decimals may stand for
             assert np.all(np.abs(np.diff(drive.v)) <= limit * (steps - 4.0 * np.spacing(drive.t[1:])))
             assert steps.min() > 0.999 * shortest
             assert drive.t[0] > clock
@@ -77,7 +77,7 @@ class TestLimits:
 
     @pytest.mark.parametrize("spans_a_second", [0.5, 40.0, 1e3, 1e9])
     def test_edges_are_resolved(self, tmp_path: Path, spans_a_second: float) -> None:
-        """At least three samples lie inside every move that is worth one, and inside that of a full-scale step."""
+        """At least three samples lie inside every move, full-scale steps included; sweeps and multisines are exempt."""
         for drive in made(tmp_path, 0.0, 10.0, max_rate=10.0 * spans_a_second).drives:
             if "sweep" in drive.name or "multisine" in drive.name:
                 continue
@@ -112,7 +112,7 @@ class TestLimits:
 
 class TestContent:
     def test_every_effect_is_shown_by_two_records(self, tmp_path: Path) -> None:
-        """By one to fit at least and one that judges; what goes on over the session by several to fit."""
+        """At least one record to fit shows each effect, and at least one more record, held out or to fit."""
         found = made(tmp_path)
         shown = [(drive.held_out, name) for drive in found.drives for name in drive.shows]
         for name in (*effects.CATALOGUE, "asymmetry"):
@@ -121,7 +121,7 @@ class TestContent:
         assert {name for _, name in shown} == {*effects.CATALOGUE, "asymmetry"}
 
     def test_rates_differ(self, tmp_path: Path) -> None:
-        """The same loops at rates three decades apart; most samples to fit are fast ones."""
+        """The same loops run at rates three decades apart, and most samples to fit are a sample time apart."""
         found = made(tmp_path)
         rates = [drive.fastest for drive in found.drives]
         assert max(rates) > 1e3 * min(rates)
@@ -180,7 +180,7 @@ class TestCommand:
         assert [path.read_bytes() for path in sorted((tmp_path / "plan").iterdir())] == before
 
     def test_the_command_of_the_page_runs(self, tmp_path: Path, run: Call) -> None:
-        """Measured records where the page says, the command of the page, and a diagnosis."""
+        """With measured records where the page says, the command of the page makes a diagnosis."""
         folder = tmp_path / "my plan"
         _, _, err = run("diagnose", "--plan", file_of(tmp_path), "-o", folder)
         words = shlex.split(err.splitlines()[-1].removeprefix("then run: "))
@@ -268,7 +268,7 @@ class TestCommand:
 
 
 class TestSeparation:
-    """Plants that share nothing with the package, driven by the plan, each with one hidden effect."""
+    """Plants that share no code with the package, driven as planned, each with one hidden effect."""
 
     @pytest.mark.parametrize("name", SAMPLE)
     def test_the_hidden_effect_is_named_first(self, tmp_path: Path, name: str) -> None:

@@ -1,4 +1,4 @@
-"""The blind plants themselves: that they hold what their labels say, and that the score counts right.
+"""The blind plants themselves: they behave as their labels say, and the score counts correctly.
 
 Their physics is checked against closed solutions and loops written here; only their files are read by the package.
 """
@@ -61,7 +61,7 @@ Made = Callable[[str, int], case.Case]
 
 
 class TestApart:
-    """The generator knows nothing of the package, and the workflow nothing of the labels."""
+    """The generator does not use the package, and the workflow does not see the labels."""
 
     def test_names_are_the_catalogue(self) -> None:
         from hystgen.parameters.checks import EFFECT_NAMES
@@ -131,7 +131,7 @@ class TestApart:
 
 
 class TestHysteresis:
-    """Every kind against a play sum written as a loop."""
+    """Every kind agrees with a play sum written as a loop."""
 
     @pytest.mark.parametrize(("kind", "close"), [("everett", 1e-5), ("maxwell", 1e-12), ("relays", 1e-3)])
     def test_is_the_play_sum_of_its_density(self, kind: str, close: float) -> None:
@@ -175,7 +175,7 @@ class TestHysteresis:
 
 
 class TestEffects:
-    """Each effect's own law, and that it is there to be found."""
+    """Each effect follows its own law and is large enough to be found."""
 
     @pytest.mark.parametrize("seed", range(13), ids=NAMES)
     def test_leaves_what_no_play_sum_absorbs(self, made: Made, seed: int) -> None:
@@ -186,7 +186,7 @@ class TestEffects:
         assert truth["effects"][0]["ratio"] == pytest.approx(item.unabsorbed / found.noise())
         assert truth["visible"]
         assert item.unabsorbed > 3.0 * found.noise()
-        # Another set of plays and another solver agree on what is left
+        # Another set of plays and another solver agree on the residual
         assert self.left(found) == pytest.approx(item.unabsorbed, rel=0.15)
 
     @staticmethod
@@ -286,7 +286,7 @@ class TestEffects:
             assert all(item.unabsorbed > 2.5 * pair.noise() for item in pair.present)
 
     def test_held_out_records_alone_show_no_effect(self, made: Made) -> None:
-        """What is left in the records to fit, after a refit to these, by another solver; and what it is good for."""
+        """The residual after a refit to the records to fit alone is that of another solver, and exceeds the noise."""
         for kind, seed in (("single", NAMES.index("slew_limit")), ("pair", 2)):
             found = made(kind, seed)
             held_out = np.array([record.held_out for record in found.session.records])
@@ -412,7 +412,7 @@ class TestRivals:
     def test_an_output_that_falls_while_the_drive_rises(self, made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
         found = made("single", NAMES.index("sensor_nonlinearity"))
         clean = [found.session.sampled(found.plant.respond(found.session), k) for k in found.session.records]
-        falling = replace(found, added=tuple(-2.0 * y for y in clean))  # no weight of a play sum is above 0
+        falling = replace(found, added=tuple(-2.0 * y for y in clean))  # so that no play has a positive weight
         monkeypatch.setattr(rivals, "RIVALS", {"sensor_nonlinearity": rivals.RIVALS["sensor_nonlinearity"]})
         assert 0.0 < labels.compared(falling, found.plant)["sensor_nonlinearity"] < math.inf
 
@@ -476,12 +476,12 @@ class TestScore:
     def test_right_wrong_and_alike(self) -> None:
         assert outcome().exact
         assert not outcome(names=("delay",)).first_right
-        # Alike by the label, but not said so
+        # Indistinguishable by the label, but not reported as such
         assert not outcome(names=("delay",), alike=("delay",)).first_right
         said = outcome(names=("delay",), alike=("delay",), groups=(("lag", "delay"),))
         assert said.exact
         assert said.column == score.ALIKE
-        # Said to be alike, but not so by the label
+        # Reported as indistinguishable, but not by the label
         excuse = outcome(names=("delay",), groups=(("lag", "delay"),))
         assert not excuse.first_right
         assert excuse.confident_wrong == []
@@ -510,7 +510,7 @@ class TestScore:
         assert kept["single: right name first"].value == pytest.approx(0.97)
         assert kept["single: right name first"].kept
         assert not self.figures(*good, *[outcome(names=("delay",))] * 4)["single: right name first"].kept
-        # What is too weak to be asked for does not count
+        # Effects too weak to be expected do not count
         assert self.figures(*good, *[outcome(names=(), ratio=2.9)] * 50)["single: right name first"].value == 1.0
         free = self.figures(*[outcome("none", (), ())] * 9, outcome("none", ()))
         assert free["effect-free: cases with a name"].value == 1.0
@@ -605,7 +605,7 @@ class TestCommands:
         assert [[float(x) for x in h.split(",")] for h in history] == ([spec["history"]] if spec["history"] else [])
         kept = (results / home.name / "run.json").read_text()
         assert json.loads(kept)["exit"] == 0
-        # A case with a result is not run again, so the package is not asked
+        # A case with a result is not run again, so the package is not called
         assert main(["run", str(tmp_path / "cases"), "-o", str(results)]) == 0
         assert (results / home.name / "run.json").read_text() == kept
         report = tmp_path / "score.json"
@@ -634,7 +634,7 @@ class TestActivatedFriction:
     WIDTH, STRENGTH, RATE = 10.0, 0.04, 50.0
 
     def stretch(self, v: Array, dt: float) -> Array:
-        """What the spring is stretched by."""
+        """Stretch of the spring."""
         y, one = np.array([self.WIDTH]), np.ones(1)
         return np.asarray(v - base._activated(v, np.full(len(v), dt), y, one, self.STRENGTH, self.RATE))
 
@@ -648,7 +648,7 @@ class TestActivatedFriction:
         assert stretch[1999] == pytest.approx(expected, rel=1e-6)
         assert stretch[-1] == pytest.approx(-expected, rel=1e-6)
         sticks = np.abs(stretch) < self.WIDTH * (1.0 - 1e-9)
-        # behind the turn, from one limit to the other
+        # after the turn, from one limit to the other
         assert abs(np.count_nonzero(sticks) - 2.0 * self.WIDTH / 0.05) <= 2
         assert np.diff(stretch)[sticks[1:]] == pytest.approx(np.diff(v)[sticks[1:]], abs=1e-12)
 
@@ -665,7 +665,7 @@ class TestActivatedFriction:
 
 @pytest.mark.thorough
 def test_a_diagnosed_plant_follows_a_reference() -> None:
-    """Behind the inverse of its diagnosed model an eighth is left of what plays alone leave; `make track` runs more."""
+    """The inverse of its diagnosed model leaves an eighth of the error of plays alone; `make track` runs more."""
     row = track.track("delay", 1)
     assert row.named
     assert row.whole < 0.12 * row.plays < 0.12 * row.line

@@ -1,13 +1,13 @@
 """Machine proof that emitted fixed-point C cannot fault: Frama-C's Eva over every sequence of calls with every code.
 
-Eva covers all that a program can do with sets of values; what it finds no alarm in cannot happen in any run. No alarm
+Eva covers everything a program can do with sets of values; a fault without an alarm cannot happen in any run. No alarm
 means: no signed overflow, no conversion to a narrower signed type that changes the value, no invalid shift, no access
-outside an object, no read of what was never written; there is no division. Conversions to unsigned types are meant to
-cut off, differences in them to wrap where a curve measures its argument from the start of a piece. Right shifts of
-negative numbers are the compiler's to define: the emitted C refuses to compile where they do not keep the sign.
+outside an object, no read of an uninitialized value; there is no division. Conversions to unsigned types are meant to
+truncate, differences in them to wrap where a curve measures its argument from the start of a piece. Right shifts of
+negative numbers are implementation-defined: the emitted C refuses to compile where they do not keep the sign.
 
-Of the engine `loop` nothing is assumed but that init comes first. Of `corners` also what `granted` lists about the list
-of corners; that this holds is looked at in runs, and instances are static there, which C sets to zero.
+For the engine `loop`, the only assumption is that init comes first. For `corners`, the facts about the list of corners
+that `granted` lists are assumed too; runs check them, and instances are static there, which C sets to zero.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MANY = head("many", -10, 10) + f"\n  pi: {{thresholds: {THRESHOLDS.tolist()}, we
 FEWER = f"{{thresholds: {THRESHOLDS[::4].tolist()}, weights: {WEIGHTS[::4].tolist()}}}"
 SIXTEEN = head("sixteen", -10, 10) + f"\n  pi: {FEWER}\n"
 
-# What is proved: plays alone, start lists with an offset, dead zones, tanh, two branches, cascades; up to 64 plays
+# Models of the proof: plays alone, start lists with an offset, dead zones, tanh, two branches, cascades; up to 64 plays
 LOOP = [
     ("plain", "q31"),
     ("plain", "q15"),
@@ -71,13 +71,12 @@ CORNERS = [
 ]
 PROVED = [(*module, "loop") for module in LOOP] + [(*module, "corners") for module in CORNERS]
 
-# int, long and pointers as on 64 bits, and as on a core of 32 without a long multiplication, which takes its own path
+# int, long and pointers of a 64-bit machine, and of a 32-bit core without long multiplication, which has its own code
 MACHINES = {
     "64 bits": ["-machdep", "gcc_x86_64", "-cpp-extra-args=-Dvolatile="],
     "32 bits": ["-machdep", "gcc_x86_32", "-cpp-extra-args=-Dvolatile= -D__ARM_ARCH_6M__"],
 }
-# volatile keeps compilers from calling memset and has no other meaning here; Eva would take all that is written through
-# it for unknown
+# volatile only keeps compilers from calling memset; Eva would treat everything written through it as unknown
 
 DRIVER = """
 #include "{name}.h"
@@ -134,24 +133,24 @@ EFFECTS = {
     "bumpy": ("name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5",),
     "uneven": ("name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]",),
 }
-"""Models with one effect, every block and every kind of plays. What `granted_states` lists is looked at in runs of
-`test_fixed_chain`; instances are static there."""
+"""Models with effects, covering every block and every kind of plays. Runs of `test_fixed_chain` check the facts that
+`granted_states` lists; instances are static there."""
 
 FRONTS = {"steady": BRANCHES}
 
 QUIET = "emit: {compensation: {quiet: true}}\n"
 
 COMPENSATED = {"drifted": "drift", "heated": "self_heating", "rubbed": "self_heating"}
-"""What of these is asked for although nothing measures it."""
+"""Effects that are compensated on request although nothing measures them."""
 
 CODE, ANY = "any_code", {"set_travel": "any_travel"}
-"""What a call is given; all but one are given codes."""
+"""Arguments of calls; all but one take codes."""
 
 CALL = "        case {}: {}; break;\n"
 
 
 def chain_driver(one: Model, arithmetic: str) -> str:
-    """Every call of both operators of a model with effects, in any order with any codes."""
+    """A driver that makes every call of both operators of a model with effects, in any order with any codes."""
     name = one.name
     calls = module.of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained")).calls
     cases = [
@@ -185,7 +184,7 @@ def model(name: str) -> Model:
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
-    """Emits the module with its driver; returns its C file."""
+    """Emit the module with its driver; return its C file."""
     one = model(name)
     hystgen.emit(one, folder, operator="both", arithmetic=arithmetic, engine=engine)
     source = folder / f"{name}.c"
@@ -203,10 +202,10 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
 
 
 def alarms(source: Path, machine: str) -> list[str]:
-    """What Eva cannot exclude, from the module with its driver beside it."""
+    """Alarms of Eva on the module with its driver, which lies beside it."""
     name, text = source.stem, source.read_text()
     plays = int(re.search(r"_N_PLAYS (\d+)", source.with_suffix(".h").read_text())[1])  # type: ignore[index]
-    apart = {  # how many states are kept apart: play by play, coefficient by coefficient, not all in one
+    apart = {  # states kept apart per function, so that plays and coefficients are not merged
         "loop_rest": 2 * plays + 20, "loop_start": 2 * plays + 20, "loop_solve": 2 * plays + 20,
         **dict.fromkeys(("relaxing_follow", "moved_follow", "relax", "moved_rest"), 2 * plays + 20),
         "start": 300, "find": 1000, "curve": 300, "delay_rest": 30,
@@ -214,13 +213,13 @@ def alarms(source: Path, machine: str) -> list[str]:
         "yield": 1000,
     }  # fmt: skip
     visits = [f"{name}_{what}:{states}" for what, states in apart.items() if f"{name}_{what}(" in text]
-    # half words are put together, curves measure arguments, the corner engine measures ways
+    # half words are joined, curves measure arguments, and the corner engine measures ways: all of them wrap
     wraps = machine == "32 bits" or f"{name}_curve(" in text or f"{name}_find(" in text
     done = subprocess.run(
         [
             frama_c(), *MACHINES[machine], "-warn-signed-downcast", *(["-warn-unsigned-overflow"] if not wraps else []),
             "-eva", "-eva-precision", "0", "-eva-no-print", "-eva-domains", "symbolic-locations",
-            "-eva-widening-delay", str(12 if f"{name}_loop_rest(" in text else plays + 6),  # until as many corners
+            "-eva-widening-delay", str(12 if f"{name}_loop_rest(" in text else plays + 6),  # one for each corner
             "-eva-auto-loop-unroll", str(plays + 2), "-eva-plevel", "400",
             "-eva-slevel-function", ",".join(visits),
             source.with_name("driver.c"), source,
@@ -228,15 +227,15 @@ def alarms(source: Path, machine: str) -> list[str]:
         capture_output=True, text=True, timeout=900, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    # all of the module was looked at: some limits never act, since no code comes near them
+    # all of the module was analysed: some limits never act, since no code comes near them
     functions = re.search(r"(\d+) functions analyzed \(out of (\d+)\)", done.stdout)
     reached = re.search(r"(\d+) statements reached \(out of (\d+)\)", done.stdout)
     assert functions, done.stdout
     assert reached, done.stdout
-    # every code is a number: a model with effects has calls and branches for what is none that are never taken
+    # every code is a number, so a model with effects never takes its calls and branches for other values
     idle = 2 if name in EFFECTS else 0
     assert int(functions[2]) - idle <= int(functions[1]), done.stdout
-    # two statements of a fact are never reached where Eva finds by itself that it holds
+    # where Eva finds by itself that a fact holds, two of its statements are never reached
     known = 2 * len(re.findall(r"^ +(?:GRANTED|WITHIN)\(", text, flags=re.MULTILINE)) if name in EFFECTS else 0
     assert int(reached[1]) > (0.92 if name in EFFECTS else 0.96) * (int(reached[2]) - known), done.stdout
     found = re.findall(r"^\[eva:alarm\] (.*(?:\n  .*)*)", done.stdout, flags=re.MULTILINE)
@@ -260,8 +259,8 @@ def test_no_sequence_of_calls_can_fault_a_model_with_an_effect(name: str, arithm
 
 CLAMP, UNCLAMPED = r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n"
 
-# Faults put into the emitted two_branches in q31, and the alarm that has to follow: table entries, limits, a loop, a
-# start; a search that goes too far
+# Faults put into the emitted two_branches in q31, and the alarm each must raise: in table entries, limits, a loop, a
+# start, and a search that goes too far
 FAULTS = [
     ("loop", ".c", r"(#define TWO_BRANCHES_FRACTION )\d+u", r"\g<1>40u", "signed overflow"),
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
@@ -287,7 +286,7 @@ def test_faults_raise_alarms(
     assert any(alarm in found for found in alarms(source, "32 bits"))
 
 
-# Faults put into what blocks of effects compute, in q31, and the alarm that has to follow
+# Faults put into blocks of effects in q31, and the alarm each must raise
 EFFECT_FAULTS = [
     ("crept", r"\(settled - state\[i\]\.next\) >> t->drop", "settled - state[i].next", "signed downcast"),
     ("crept", r"(crept_creep_1 = \{[^;]*, )\d+(, \d+, 3,)", r"\g<1>25\2", "signed overflow"),
@@ -331,7 +330,7 @@ void not_granted(int line)
 
 
 def run(folder: Path, one: Model, arithmetic: str, op: str, sums: int = 1) -> str:
-    """What the module with the checks of `granted` says over the verification records; nothing if all hold."""
+    """Messages of the module with the checks of `granted` over the verification records; empty if all hold."""
     gcc = compilers.find("gcc")
     if gcc is None:
         assert not os.environ.get("CI"), "gcc is missing"

@@ -1,4 +1,4 @@
-"""Data files by format: HDF5, MATLAB v5 and v7.3, Parquet, units, large files, and the bar while they are read.
+"""Data files by format: HDF5, MATLAB v5 and v7.3, Parquet, units, large files, and the progress bar while reading.
 
 The files are written with each format's own library, never by the package.
 """
@@ -104,7 +104,7 @@ def write_h5(path: Path, columns: Columns) -> None:
 
 
 def write_mat_73(path: Path, columns: Columns) -> None:
-    """As MATLAB's `save -v7.3` lays it out: 512 bytes of its own, rows of 1xN stored transposed, a class for each."""
+    """Write as MATLAB's `save -v7.3` does: a header of 512 bytes, 1xN rows stored transposed, a class for each."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, x in columns.items():
             matlab(file, name, x)
@@ -280,7 +280,7 @@ def outside_layout(file: h5py.File, name: str, other: Path) -> None:
 def test_what_a_file_keeps_elsewhere_is_not_read(
     tmp_path: Path, name: str, keep: Callable[[h5py.File, str, Path], None]
 ) -> None:
-    """The numbers are there and could be read, as h5py shows; another file is nevertheless not opened."""
+    """The numbers exist, and h5py can read them, but the package does not open another file."""
     other = tmp_path / "other"
     write_h5(other.with_suffix(".h5"), {"y": Y})
     Y.tofile(other.with_suffix(".raw"))
@@ -473,10 +473,10 @@ def test_an_archive_with_more_than_arrays(tmp_path: Path) -> None:
 
 
 MANY = 20_000
-"""Columns of a wide file: one channel a sensor of an array, or spectra side by side."""
+"""Columns of a wide file: one channel per sensor of an array, or spectra side by side."""
 
 WIDE = {"text": "on", "numbers": "{}.5", "gaps": "{}.5", "quoted": '"{}.5"'}
-"""How a cell of the k-th further column is written; of those with gaps one a row is empty."""
+"""Format of a cell of the k-th further column; with gaps, one cell per row is empty."""
 
 
 @pytest.mark.parametrize("kind", WIDE)
@@ -490,7 +490,7 @@ def test_a_table_of_many_columns_takes_seconds(tmp_path: Path, kind: str) -> Non
             file.write(",".join([*own, *cells]) + "\n")
     started = time.process_time()
     record = read_record(tmp_path / "a.csv")
-    # 1 to 3 s; before names were counted in one pass it took a minute
+    # this takes 1 to 3 s; it took a minute before names were counted in one pass
     assert time.process_time() - started < 15.0
     check(record)
     assert len(record.extra) == (0 if kind == "text" else MANY)
@@ -499,7 +499,7 @@ def test_a_table_of_many_columns_takes_seconds(tmp_path: Path, kind: str) -> Non
 
 
 def test_many_columns_in_every_format(tmp_path: Path) -> None:
-    """As many as the writers make in a moment; reading takes a time in proportion to their number."""
+    """As many columns as the writers make in a moment; the time to read them is proportional to their number."""
     further = {f"c{k}": np.full(N, k + 0.5) for k in range(1500)}
     for file, write in WRITERS.values():
         write(tmp_path / file, {"t": T, "v": V, "y": Y, **further})
@@ -536,7 +536,7 @@ def test_without_the_library_of_a_format(
 
 
 def test_more_samples_than_memory(tmp_path: Path) -> None:
-    """A file of a few bytes can claim any length: HDF5 stores nothing for values that were never written."""
+    """HDF5 stores nothing for values that were never written, so a file of a few bytes can claim any length."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name in "tvy":
             file.create_dataset(name, shape=(1 << 50,), chunks=(1 << 20,), dtype="f8")
@@ -547,7 +547,7 @@ def test_more_samples_than_memory(tmp_path: Path) -> None:
 def test_more_samples_than_memory_of_a_system_that_promises_any(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write: Callable[[Path, Columns], None]
 ) -> None:
-    """It gives as much as is asked for, and ends the process when that is used."""
+    """A system that promises any memory grants every request, and ends the process when the memory is used."""
     path = tmp_path / write.__name__.replace("write_", "a.")
     write(path, {"t": T, "v": V, "y": Y})
     monkeypatch.setattr(reading, "_memory", lambda: 2.0 * 8.0 * 3.0 * len(T))
@@ -623,7 +623,7 @@ def attribute_h5(where: str) -> Callable[..., None]:
 def test_a_sample_rate_beside_the_columns(
     tmp_path: Path, file: str, write: Callable[..., None], key: str, value: float
 ) -> None:
-    """It counts for the columns that it belongs to, and only where they have no time of their own."""
+    """A sample rate applies to the columns that it belongs to, and only if they have no time of their own."""
     write(tmp_path / file, {"v": V, "y": Y}, key, value)
     record = read_record(tmp_path / file)
     check(record)
@@ -674,7 +674,7 @@ def test_names_of_arrays_are_understood(tmp_path: Path) -> None:
         ("U / V", "U", "V"), ("t/ms", "t", "ms"), ("t_min", "t", "min"), ("T [°C]", "T", "°C"),
         ("gain (um/V)", "gain", "um/V"), ("a (m/s^2)", "a", "m/s^2"), ("y (counts)", "y", "counts"),
         ("y [-]", "y", ""), ("pressure [mbar abs.]", "pressure", "mbar abs."),
-        # Names that look as if they had one
+        # Names that only look as if they had a unit
         ("y (raw)", "y (raw)", ""), ("y_min", "y_min", ""), ("v_in", "v_in", ""), ("y_m", "y_m", ""),
         ("channel [1]", "channel [1]", ""), ("ch (2)", "ch (2)", ""), ("dy/dt", "dy/dt", ""), ("[V]", "[V]", ""),
         ("_s", "_s", ""), ("v [" + "x" * 41 + "]", "v [" + "x" * 41 + "]", ""),
@@ -687,7 +687,7 @@ def test_units_in_headers(header: str, name: str, unit: str) -> None:
 
 @every_format
 def test_names_with_units_are_understood(tmp_path: Path, name: str, write: Callable[..., None]) -> None:
-    # MATLAB's names are words
+    # MATLAB allows letters, digits and underscores in names
     columns = {"t_s": T, "v_V": V, "y_um": Y, "temperature_degC": T}
     if "mat" not in name and name != "A.HDF5":
         columns = {"t [s]": T, "v [V]": V, "y (um)": Y, "temperature [degC]": T}
@@ -733,7 +733,7 @@ def test_time_is_converted_to_seconds(tmp_path: Path, unit: str, scale: float) -
     for name in ("a.h5", "a.csv"):
         record = read_record(tmp_path / name)
         assert np.allclose(record.t, seconds, rtol=1e-14)
-        # By a division, which gives the double next to the time that the file's digits mean
+        # The division gives the double next to the time that the file's digits mean
         assert scale < 1.0 or record.t[1] == 7.2
         assert record.notes == (f"t is in {unit}; it was converted to seconds",)
         assert record.units == {"t": "s"}
@@ -787,7 +787,7 @@ def test_units_that_records_agree_on() -> None:
 
 
 def swept(path: Path, header: Sequence[str]) -> Path:
-    """A drive that sweeps, and what a play of 5 makes of it."""
+    """A drive that sweeps, and half of it plus a play of threshold 5."""
     v = np.concatenate([np.linspace(0, 40, 60), np.linspace(40, -40, 120), np.linspace(-40, 40, 120)])
     y, state = [], 0.0
     for x in v.tolist():
@@ -864,10 +864,10 @@ def written(cells: Sequence[Sequence[str]], header: str, end: str = "\n") -> byt
 
 
 def awkward(samples: int) -> list[list[str]]:
-    """Numbers near which a decimal reader that rounds twice goes wrong, and all kinds of digits."""
+    """Numbers that a decimal reader gets wrong if it rounds twice, and all kinds of digits."""
     rng = np.random.default_rng(5)
     values = rng.integers(0, 2**63, samples * 2, dtype=np.uint64).view(np.float64)
-    values = np.where(np.abs(values) < LARGEST, values, 1.0)  # others stand for no value
+    values = np.where(np.abs(values) < LARGEST, values, 1.0)  # larger numbers stand for missing values
     texts = [repr(x) for x in values.tolist()]
     hard = ["9007199254740993", "1.00000000000000011102230246251565", "2.2250738585072011e-308", "4.9e-324", "+1.5E-3",
             ".5", "7.", "0.1e1", "12345678901234567890.1234567890", "8.988465674311580e-307"]  # fmt: skip
@@ -899,7 +899,7 @@ def test_both_ways_through_a_block_round_as_python_does(tmp_path: Path) -> None:
 
 
 def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The places reported are those of the file, whichever blocks they are in."""
+    """The places reported are those in the file, whichever blocks they are in."""
     monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5)), "ok"] for k in range(2000)]
     header = "t,v,y,state"
@@ -950,7 +950,7 @@ def test_a_column_that_turns_out_to_be_text_late(tmp_path: Path, monkeypatch: py
     "text", ["plain", '"a,b"', '"a""b"', '"a,""b"', ' "a,b"', 'a"b,c"d', '"', '"a"b', 'a""', '""', '"a","b', "#1"]
 )
 def test_text_between_the_columns_does_not_move_them(tmp_path: Path, text: str) -> None:
-    """In the middle, so that a delimiter taken for one too many would move y; by the csv module where it agrees."""
+    """The text is in the middle, so a delimiter too many would move y; the csv module confirms the refusals."""
     cells = [[repr(k * 0.001), repr(float(k % 7)), "ok", repr(float(k % 5))] for k in range(100)]
     cells[0][2] = "ok"
     cells[50][2] = text
@@ -1004,14 +1004,14 @@ def test_memory_stays_below_three_times_what_is_kept(large: dict[str, dict[str, 
     found = large[file]
     assert found["samples"] == 1_000_000
     assert found["peak"] < 3.0
-    # The two faults are extra rows, so all that was meant is there
+    # The two faults are extra rows, so all intended rows are there
     assert found["sum"] == pytest.approx(found["meant"], abs=1e-6)
     assert len(found["notes"]) == (2 if file == "faults.csv" else 0)
 
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What reading 10^6 samples takes, by file; `benchmarks/record_memory.py` measures 10^7 the same way."""
+    """Memory that reading 10^6 samples takes, by file; `benchmarks/record_memory.py` measures 10^7 the same way."""
     benchmark = Path(__file__).resolve().parent.parent / "benchmarks" / "record_memory.py"
     code = (
         "import importlib.util, json, sys\nfrom pathlib import Path\n"
@@ -1029,7 +1029,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]
     return found
 
 
-# The bar ---------------------------------------------------------------------------------------------------
+# The progress bar ------------------------------------------------------------------------------------------
 
 PATIENT = "import sys, hystgen.basics.progress as p; p.PATIENCE = {}; from hystgen import cli; cli.main(sys.argv[1:])"
 
@@ -1078,7 +1078,7 @@ def terminal(ours: int) -> str:
     while True:
         try:
             part = os.read(ours, 4096)
-        except OSError:  # Linux says so when the last writer is gone
+        except OSError:  # Linux raises it when the last writer is gone
             part = b""
         if not part:
             os.close(ours)
@@ -1100,7 +1100,7 @@ def array(sort: int, name: bytes, inside: bytes) -> bytes:
 
 
 def nested(sort: int, depth: int, packed: bool) -> bytes:
-    """A .mat file of structs or cells in each other, put together from the inside."""
+    """A .mat file of nested structs or cells, built from the inside out."""
     fields = struct.pack("<HHi", 5, 4, 8) + element(1, b"a".ljust(8, b"\0"))
     found = array(6, b"", element(9, struct.pack("<d", 1.0)))
     for level in range(depth):
@@ -1112,7 +1112,7 @@ def nested(sort: int, depth: int, packed: bool) -> bytes:
 
 
 class TestNesting:
-    """Files that a library reads by recursion in C, which takes the process down."""
+    """Files that a library reads by recursion in C, which crashes the process."""
 
     @pytest.mark.parametrize("packed", [False, True])
     @pytest.mark.parametrize("sort", [1, 2])
@@ -1128,7 +1128,7 @@ class TestNesting:
 
     @pytest.mark.parametrize("packed", [False, True])
     def test_the_walk_goes_through_every_class(self, tmp_path: Path, packed: bool) -> None:
-        """A struct of everything that scipy writes, in structs and cells; how deep is counted in what scipy reads."""
+        """A struct of everything that scipy writes, in structs and cells; its depth is counted in what scipy reads."""
         everything: Any = {
             "numbers": np.arange(5.0), "imaginary": np.arange(3) * 1j, "text": "abc", "words": ["a", "bcd"],
             "short": np.int8([1, 2, 3]), "none": np.zeros((0, 0)), "sparse": scipy.sparse.eye(3).tocsc(),
@@ -1164,7 +1164,7 @@ class TestNesting:
             assert problems(tmp_path / "damaged.mat")
 
     def test_a_count_without_content(self, tmp_path: Path) -> None:
-        """Two thousand million structs without fields, in 136 bytes."""
+        """The file claims two billion structs without fields, in 136 bytes."""
         fields = struct.pack("<HHi", 5, 4, 8) + element(1, b"")
         data = array(2, b"s", fields).replace(struct.pack("<ii", 1, 1), struct.pack("<ii", 2**31 - 1, 1))
         (tmp_path / "many.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + data)

@@ -116,7 +116,7 @@ class TestRead:
         assert len(record.v) == 0
         assert np.array_equal(record.extra["u"], [1.0, 1.0, 1.0])
         assert record.y is not None
-        assert np.isnan(record.y[0])  # not needed, so nothing is dropped for it
+        assert np.isnan(record.y[0])  # y is not needed, so no sample is dropped for it
 
     def test_npz_and_mat(self, tmp_path: Path) -> None:
         from scipy.io import savemat

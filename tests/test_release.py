@@ -1,4 +1,4 @@
-"""What a release says of itself: metadata, changelog, citation, and the workflow that publishes it."""
+"""Metadata, changelog and citation of a release, and the workflow that publishes it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
 def tool(name: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run a program of the environment of the tests."""
+    """Run a program of the environment in which the tests run."""
     command = [str(Path(sys.executable).with_name(name)), *map(str, arguments)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
@@ -54,7 +54,7 @@ def test_the_citation_agrees_with_the_metadata() -> None:
 
 
 def test_the_workflow_lints_clean(tmp_path: Path) -> None:
-    """Offline, with the strictest rules: actions pinned by commit, no credentials kept, least permissions."""
+    """Checked offline, with the strictest rules: actions pinned by commit, no credentials kept, least permissions."""
     options = ("--offline", "--no-config", "--persona", "pedantic")
     done = tool("zizmor", *options, ".github/workflows")
     assert done.returncode == 0, done.stdout

@@ -1,4 +1,4 @@
-"""The report of an identification: what the page says against what was put in, and how a browser shows it."""
+"""The report of an identification: the page agrees with the data put in, and a browser shows it correctly."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def made(name: str, seed: int, front: Callable[[Array], Array] = bent, weights: 
 
 
 def spoilt() -> Record:
-    """A record with outliers, spikes of the drive and a gap, at known places of the whole one."""
+    """A record with outliers, spikes of the drive and a gap, at known places of the whole record."""
     whole = made("spoilt.csv", 4)
     assert whole.y is not None
     v, y = whole.v.copy(), whole.y.copy()
@@ -70,13 +70,13 @@ def spoilt() -> Record:
 
 
 def place(samples: tuple[int, ...]) -> list[int]:
-    """Where samples of the whole record are in the one with a gap."""
+    """Indices of samples of the whole record in the record with a gap."""
     return [k if k < CUT else k - (CONTINUED - CUT) for k in samples]
 
 
 @dataclass
 class Page(HTMLParser):
-    """What is in the page: tags with attributes, text by section, rows of the tables."""
+    """Content of the page: tags with attributes, text by section, rows of the tables."""
 
     text: str
     tags: list[tuple[str, dict[str, str]]] = field(default_factory=list)
@@ -512,7 +512,7 @@ class TestBrowser:
         return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
 
     def measured(self, chromium: str, folder: Path, page: str, width: int) -> tuple[dict[str, list[float]], list[str]]:
-        """What the page is like in a window of that width, and what the browser complained of."""
+        """Measures of the page in a window of that width, and the complaints of the browser."""
         (folder / "frame.html").write_text(
             f"""<!DOCTYPE html><html><head><meta charset="utf-8"></head><body>
 <iframe style="width: {width}px; height: 900px; border: 0" srcdoc="{html.escape(page)}"></iframe><pre></pre>

@@ -1,6 +1,6 @@
-"""The files of `c_runtime/` and of effects as they stand.
+"""The C files of `c_runtime/` and of effects, as they are before emission.
 
-They compile clean, each by itself and in units, and are the textbook model and the bit reference.
+They compile without warnings, alone and in units, and give the textbook model and the bits of the reference.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
 
 @pytest.mark.parametrize("unit", units.UNITS, ids=map("-".join, units.UNITS))
 def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str, str, str], tmp_path: Path) -> None:
-    """Compiled clean by gcc and clang, nothing renamed, nothing left out."""
+    """gcc and clang compile the files without warnings, with nothing renamed and nothing left out."""
     name, arithmetic, engine = unit
     source = units.write(tmp_path, *unit)
     flags = ["-std=c99", "-O2", "-fPIC", "-shared", *C_WARNINGS, *units.FLAGS, *units.DEFINES[arithmetic]]
@@ -200,7 +200,7 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
 
 
 def test_every_line_is_in_a_unit() -> None:
-    """And in one that is analysed, of both kinds of arithmetic if it is in units of both."""
+    """Each line is also in an analysed unit, of both kinds of arithmetic if it is in units of both."""
     found = set().union(*(units.lines(*unit) for unit in units.ANALYSED))
     for coded in (False, True):
         analysed = set().union(*(units.lines(*unit) for unit in units.ANALYSED if ARITHMETICS[unit[1]].fixed == coded))
@@ -219,7 +219,7 @@ def test_every_line_is_in_a_unit() -> None:
 
 
 def opened(path: Path) -> tuple[list[str | Path], str]:
-    """The arguments that compile a file as an editor has it, and what is given as input: a header is included."""
+    """Arguments that compile a file as an editor opens it, and the standard input, which includes a header."""
     if path.suffix == ".c":
         return [path], ""
     return ["-x", "c", "-"], f'#include "{units.relative(path)}"\nextern int unit;\n'
@@ -236,7 +236,7 @@ def test_a_file_compiles_as_it_is_opened(compiler: str, path: Path) -> None:
 
 @pytest.mark.parametrize("folder", [units.RUNTIME, units.EFFECTS], ids=lambda folder: folder.name)
 def test_editors_are_told_how_to_compile(folder: Path) -> None:
-    """`compile_flags.txt` says what the test above does: clang runs in the folder that has it."""
+    """`compile_flags.txt` has the flags of the test above; clang runs in the folder that has the file."""
     flags = (folder / "compile_flags.txt").read_text(encoding="ascii").split()
     places = {(folder / flag.removeprefix("-I")).resolve() for flag in flags if flag.startswith("-I")}
     assert places == {units.RUNTIME.resolve(), units.EFFECTS.parent.resolve()}
@@ -248,7 +248,7 @@ def test_editors_are_told_how_to_compile(folder: Path) -> None:
 
 @pytest.mark.parametrize("path", units.standing(), ids=units.relative)
 def test_a_file_opens_with_a_paragraph(path: Path) -> None:
-    """What it does stands in front of its first line of code."""
+    """The paragraph says what the file does, and comes before its first line of code."""
     text = path.read_text(encoding="ascii")
     assert re.match(r"/\*(?:[^*]|\*(?!/)){20,}\*/\n", text) or path.name == "part.c"
 
@@ -295,7 +295,7 @@ def test_neither_facts_nor_the_default_model_are_emitted(name: str, arithmetic: 
 
 
 def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
-    """What both operators do alike has a prefix in C alone; Python has no status function, a run reads it."""
+    """Functions that both operators share have a prefix only in C; Python has no status function, as a run reads it."""
     modules = (loop, fixed, step, step_float, step_fixed, chain_step, chain_step_float, chain_step_fixed)
     trees = (ast.parse(Path(module.__file__).read_text(encoding="utf-8")) for module in modules)
     own = {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
@@ -304,7 +304,7 @@ def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
     written = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
     names = {re.sub("^operator_", f"{op}_", name) for name in written for op in runtime.OPERATORS}
     assert len(names) > 20
-    start = {"loop_init"}  # of two files, one of which is chosen where Python asks how long the list is
-    parts = {"played", "passed_on", "next", "limited", "wanted"}  # of a step: lines in Python, apart in C for its stack
+    start = {"loop_init"}  # in two C files, of which one is chosen; Python asks how long the list is
+    parts = {"played", "passed_on", "next", "limited", "wanted"}  # of a step: inline in Python, calls in C for stack
     others = {re.sub("^(forward|inverse)_", "", n) for n in names if n not in own}
     assert others - own == start | parts

@@ -1,4 +1,4 @@
-"""The second simulator of plants, and what the diagnosis makes of a few of them."""
+"""The second simulator of plants, and the diagnosis of a few of its plants."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_the_stack_of_extremes_is_a_preisach_model() -> None:
 
 
 def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
-    """It happens halfway between two times, where its mean over a sample puts it."""
+    """The step happens halfway between two times, where its mean over a sample puts it."""
     t = np.arange(400) * 1e-3
     x = np.where(t > 0.0, 1.0, 0.0)
     since = t[1:] - 0.5e-3
@@ -52,12 +52,12 @@ def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
     limited, made = Plant([], [], []), Session(t, x, (), (), (), 400, 1e-3)
     second_plants.slew_limit(np.random.default_rng(0), made, 0.05, limited)
     assert limited.drive[0](made, x)[1:] == pytest.approx(np.minimum(since * 50.0, 1.0))
-    within = np.sin(49.0 * t)  # as fast as the limit lets pass
+    within = np.sin(49.0 * t)  # as fast as the limit allows
     assert limited.drive[0](made, within) == pytest.approx(within, abs=1e-12)
 
 
 def test_a_sine_passes_a_mode_and_a_lag_without_being_early() -> None:
-    """Four times a sample, at the sixteen samples a period of a fast record: the phase is right to 0.1 degrees."""
+    """With four times per sample and 16 samples per period of a fast record, the phase is right to 0.1 degrees."""
     t = np.arange(64 * 400) / 64.0
     x, last = np.exp(2j * np.pi * t), slice(64 * 300, None)
     for found, gain in (
@@ -72,7 +72,7 @@ def test_a_sine_passes_a_mode_and_a_lag_without_being_early() -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["single", "foreign"])
 def test_a_case_is_the_same_every_time(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With its label beside it, and the effect or disturbance as large as the label says."""
+    """Files and label have the same bytes each time, and the label names the effect or disturbance."""
     monkeypatch.setattr(second_plants, "session", _short)
     for folder in ("a", "b"):
         assert second_plants.case(kind, 2, tmp_path / folder) == f"{kind}_00002"
@@ -99,10 +99,10 @@ def _short(rng: np.random.Generator, slow: bool) -> Session:
 @pytest.mark.parametrize(
     ("kind", "seed", "names"),
     [
-        ("foreign", 6, []),  # room temperature on the gain, which was named thermal
-        ("foreign", 8, []),  # a slow line of crosstalk, named saturation and creep
+        ("foreign", 6, []),  # room temperature on the gain, once named thermal
+        ("foreign", 8, []),  # a slow line of crosstalk, once named saturation and creep
         ("single", 1, ["rate_dependence"]),
-        ("pair", 1, ["ageing", "lag"]),  # named rate dependence and ageing
+        ("pair", 1, ["ageing", "lag"]),  # once named rate dependence and ageing
     ],
 )
 def test_what_was_named_wrongly(kind: str, seed: int, names: list[str], tmp_path: Path) -> None:

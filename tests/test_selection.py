@@ -1,4 +1,4 @@
-"""What the search accepts, on made-up hypotheses of which the errors are known."""
+"""What the search accepts, shown with made-up hypotheses whose errors are known."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, float] | None = None) -> list[str]:
-    """Names of the two that are found; `alone`: what an effect leaves when it is sought from where both are."""
+    """Names of the two effects found; `alone`: the error an effect leaves if refitted alone from the fit of both."""
 
     def without(now: Hypothesis, name: str, _: Any) -> Hypothesis:
         (rest,) = now.names - {name}
@@ -54,12 +54,12 @@ BOTH = {frozenset("a"): 0.95, frozenset("ab"): 0.02}
 
 
 def test_effects_that_hide_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither is enough for a name without the other, both leave noise; a third one changes hardly anything."""
+    """Neither effect alone earns a name, both together leave only noise; a third one hardly changes anything."""
     assert together(World({**BOTH, frozenset("c"): 0.9}, "abc"), monkeypatch) == ["a", "b"]
 
 
 def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each removes 0.8 times what both leave, beside the other: enough for a first name, and not for a further one."""
+    """Next to the other, each removes 0.8 times what both leave: enough for a first name, not for a further one."""
     both = {frozenset("a"): 0.95, frozenset("ab"): 0.74}
     assert together(World(both, "ab"), monkeypatch) == ["a", "b"]
     world = World(both, "ab")
@@ -75,7 +75,7 @@ def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(
     bare: bool, enough: float, left: float, of_fitted: bool
 ) -> None:
-    """A first effect removes 0.6 times what it leaves, a further one as much as it leaves; neither less than noise."""
+    """A first effect must remove 0.6 times what it leaves, a further one as much; neither leaves less than noise."""
     held, fitted = (NOISE, left * NOISE) if of_fitted else (left * NOISE, NOISE)
     now: Any = SimpleNamespace(bare=bare, errors=lambda _: [np.full(4, fitted)])
     records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: held, to_fit=[])
@@ -83,7 +83,7 @@ def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(
 
 
 def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sought from where both are, one does as well alone: the search had merely not found it."""
+    """Started from the fit of both, one effect does as well alone: the search had merely not found that fit."""
     assert together(World(BOTH, "ab"), monkeypatch, {"a": 0.021, "b": 0.021}) == []
 
 
@@ -93,7 +93,7 @@ def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_most(
     one_loop: bool, one_speed: bool, second: float
 ) -> None:
-    """`b` leaves `second` of what is missing, and beside `a` hardly anything; `c` does nothing."""
+    """`b` alone leaves a share `second` of the gap, `a` and `b` together hardly anything; `c` does nothing."""
     shares = {"a": 0.2, "b": second, "c": 1.0, "ab": 0.02, "ac": 0.2}
     world = World({frozenset(names): share for names, share in shares.items()}, "abc")
     world.one_loop, world.one_speed = one_loop, one_speed
@@ -111,7 +111,7 @@ def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_m
 def test_one_loop_leaves_open_what_fitted_records_explain_unless_others_bear_it_out(
     held_out: float, open_: list[str]
 ) -> None:
-    """Of the fitted records `a` and `b` leave hardly anything, and `b` fails on held-out ones."""
+    """`a` and `b` leave hardly anything in the fitted records, but `b` fails on held-out ones."""
     now = Made("", 0, (1.0, 1.0))
     records: Any = SimpleNamespace(noise=NOISE, one_loop=True, residual=lambda each: each.left[1])
     tried: list[Any] = [
@@ -137,7 +137,7 @@ def test_of_one_loop_alone_what_explains_most_is_named(one_loop: bool, left: flo
 def test_of_one_loop_a_name_leaves_a_few_times_the_noise_at_most(
     one_loop: bool, share: float, named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A share of what is missing stays beside the noise: 1.5 times the noise in all, or 3.7 times."""
+    """A share of the gap remains in addition to the noise: 1.5 or 3.7 times the noise in all."""
     world = World({frozenset("a"): share}, "a")
     world.one_loop = one_loop
 
@@ -153,14 +153,14 @@ def test_of_one_loop_a_name_leaves_a_few_times_the_noise_at_most(
 @pytest.mark.parametrize("left", [0.0, 1.0])
 @pytest.mark.parametrize("memory", [0.0, 0.9, 0.99])
 def test_chance_makes_no_pair(left: float, memory: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every hypothesis leaves the same, be it noise of any colour or a disturbance that none explains."""
+    """Every hypothesis leaves the same error, be it noise of any colour or a disturbance that none explains."""
     names = "abcdef"
     same = {frozenset(a + b): left for a in names for b in names} | {frozenset(): left}
     assert together(World(same, names, memory), monkeypatch) == []
 
 
 def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`c` was the best beside the wrong `w`; beside `a`, which takes the place of that, `b` is."""
+    """`c` was the best second effect next to the wrong `w`; next to `a`, which replaces `w`, the best is `b`."""
     left = {"w": 0.5, "c": 0.6, "a": 0.7, "b": 0.8, "cw": 0.2, "bw": 0.4, "ac": 0.1, "ab": 0.02}
     world = World({frozenset(names): share for names, share in left.items()}, "abcw")
 
@@ -177,21 +177,21 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
     ]
     best: Any
     best, unchanged = selection._exchanged(now, [*found], {}, {"b", "c", "w"}, world.records)
-    assert best is now  # without `a` there is nothing better
+    assert best is now  # without `a`, nothing better is found
     assert [each.name for each in unchanged] == ["w", "c"]
     best, found = selection._exchanged(now, found, {}, {"a", "b", "c", "w"}, world.records)
     assert best.names == frozenset("ab")
     assert sorted(each.name for each in found) == ["a", "b"]
     assert found[0].before == gap
     assert found[-1].after == world.gap(best)
-    assert not any(each.rivals for each in found)  # beside the other one nothing comes near
+    assert not any(each.rivals for each in found)  # next to the other effect nothing comes near
 
 
 @pytest.mark.parametrize("second", [0.1, 1.0])
 def test_a_rival_that_is_the_next_effect_is_not_followed_up(second: float) -> None:
-    """`a`, `b` and `c` are alike; beside `a` comes `b`, and beside `c` comes `d`, which leaves least.
+    """`a`, `b` and `c` are equally good; after `a` follows `b`, and after `c` follows `d`, which leaves least.
 
-    Where nothing comes beside `a`, both rivals are asked.
+    If nothing follows `a`, both rivals are followed up.
     """
     left = {"a": 0.5, "b": 0.505, "c": 0.51, "d": 0.9, "ab": second, "bc": 0.5, "cd": 0.03}
     world = World({frozenset(names): share for names, share in left.items()}, "abcd")
@@ -215,7 +215,7 @@ def test_a_rival_that_is_the_next_effect_is_not_followed_up(second: float) -> No
 
 
 class Apart(Hypothesis):
-    """Leaves another share in held-out records than in fitted ones."""
+    """A hypothesis that leaves different shares in fitted and held-out records."""
 
     def __init__(self, world: World, names: frozenset[str], fitted: float, held_out: float) -> None:
         super().__init__(world, names, fitted)
@@ -230,7 +230,7 @@ class Apart(Hypothesis):
 
 
 def extended(world: World, now: Hypothesis, label: str, name: str, left: tuple[float, float]) -> screening.Tried:
-    """`now` with an effect in a shape, which leaves these shares in fitted and held-out records."""
+    """`now` extended by an effect in some shape, which leaves these shares in fitted and held-out records."""
     made: Any = Apart(world, now.names | {label}, *left)
     option: Any = SimpleNamespace(label=label, name=name)
     errors = made.errors(list(world.held))
@@ -239,8 +239,8 @@ def extended(world: World, now: Hypothesis, label: str, name: str, left: tuple[f
 
 @pytest.mark.parametrize(("left", "others"), [(0.3, ["r", "c"]), (0.07, [])])
 def test_what_the_accepted_effect_hides(left: float, others: list[str]) -> None:
-    """Beside `c` nothing is left for `r`, whose part it has taken, but beside `r` it takes only its own: asked where
-    `c` leaves more than three times the noise."""
+    """After `c`, nothing is left for `r`, whose part it has taken, but after `r`, `c` takes only its own part. This is
+    tried if `c` leaves more than three times the noise."""
     world = World({}, "")
     ways = {"": [("c", left), ("r", 0.6)], "c": [("r", 0.95 * left)], "r": [("c", 0.02)]}
 
@@ -261,8 +261,8 @@ def test_what_the_accepted_effect_hides(left: float, others: list[str]) -> None:
 
 @pytest.mark.parametrize(("fitted", "shapes"), [(0.05, ["a", "t"]), (0.45, [])])
 def test_another_shape_of_the_first_beside_a_second_that_spoils_it(fitted: float, shapes: list[str]) -> None:
-    """The simple shape `s` of `a` is as good by itself; beside it `t` explains fitted records and spoils held-out ones.
-    The other shape is asked only if `t` explains the fitted ones."""
+    """The simple shape `s` of `a` is as good alone, but with it `t` explains fitted records and spoils held-out ones.
+    The other shape is tried only if `t` explains the fitted records."""
     world = World({}, "")
     ways = {
         "": [("s", "a", 0.5, 0.5), ("a", "a", 0.49, 0.5)],
@@ -297,7 +297,7 @@ OF_MADE: Any = SimpleNamespace(
 @pytest.mark.parametrize(
     ("name", "free", "left", "way"),
     [
-        ("other", 1, (1.1, 1.1), True),  # fewer numbers, and no separation
+        ("other", 1, (1.1, 1.1), True),  # fewer numbers, and records do not separate the two
         ("other", 1, (1.1, 1.3), False),
         ("other", 1, (1.3, 1.1), False),
         ("other", 5, (0.9, 0.9), False),  # more numbers: the records have to separate it
@@ -307,7 +307,7 @@ OF_MADE: Any = SimpleNamespace(
         ("other", 3, (1.02, 0.97), True),  # equal over all records: the smaller held-out error
         ("other", 3, (0.98, 1.02), False),
         ("other", 3, (0.9, 1.06), False),  # held-out records separate the two
-        ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
+        ("one", 5, (0.9, 0.9), True),  # another shape of the same effect
         ("one", 3, (0.98, 0.98), False),
         ("one", 1, (1.1, 1.1), False),
     ],
@@ -325,7 +325,7 @@ def test_of_those_that_it_gives_way_to_the_last(monkeypatch: pytest.MonkeyPatch)
     found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
     assert found is not None
     assert found.best is other
-    simple = made("one", 3, (0.81, 0.81))  # a shape of its own that needs as few numbers, and leaves less
+    simple = made("one", 3, (0.81, 0.81))  # another shape of the effect, with as few numbers, that leaves less
     step = selection._Step(None, [shape, simple, other], shape, step.merit)  # type: ignore[arg-type]
     found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
     assert found is not None
@@ -343,7 +343,7 @@ def test_of_those_that_it_gives_way_to_the_last(monkeypatch: pytest.MonkeyPatch)
     ("held_out", "fitted", "first"), [(0.99, 1.2, "simple"), (1.03, 1.2, "rich"), (1.03, 1.0, "simple")]
 )
 def test_what_is_free_in_a_record_is_no_merit(held_out: float, fitted: float, first: str) -> None:
-    """The simpler one has fewer numbers, and with what the richer one leaves free explains held-out records so well."""
+    """Given what the richer effect leaves free in a record, the simpler one explains held-out records as well."""
 
     rich = Made("rich", 5, (1.0, 1.0), (1.0, 1.0))
     simple = Made("simple", 1, (2.0, 2.0), (fitted, held_out))
@@ -352,7 +352,7 @@ def test_what_is_free_in_a_record_is_no_merit(held_out: float, fitted: float, fi
 
 @pytest.mark.parametrize(("fitted", "first"), [(1.04, "simple"), (2.0, "rich")])
 def test_a_number_at_its_end_is_none_of_its_own(fitted: float, first: str) -> None:
-    """A resonance as high as it may be, say, which looks like a delay: the simpler one is named."""
+    """An example is a resonance at its highest frequency, which looks like a delay: the simpler effect is named."""
     rich, simple = Made("rich", 5, (1.0, 1.0)), Made("simple", 1, (fitted, 1.03))
     assert first_of(rich, simple) == "rich"
     rich.shape = rich.structure.bounds[1]
@@ -363,13 +363,13 @@ def test_a_number_at_its_end_is_none_of_its_own(fitted: float, first: str) -> No
     ("held_out", "fitted", "first"), [(1.02, 0.95, "other"), (1.02, 1.0, "best"), (1.08, 0.9, "best")]
 )
 def test_all_records_decide_between_equal_numbers(held_out: float, fitted: float, first: str) -> None:
-    """Held-out ones alone only where they tell the two apart."""
+    """Held-out records alone decide only if they tell the two effects apart."""
     assert first_of(Made("best", 1, (1.0, 1.0)), Made("other", 1, (fitted, held_out))) == first
 
 
 @pytest.mark.parametrize(("fitted", "first"), [(1.004, "simple"), (1.006, "rich")])
 def test_errors_that_hardly_differ_are_equal_however_certain_the_difference_is(fitted: float, first: str) -> None:
-    """The simpler one leaves a little more in every block, so that chance does not explain the difference."""
+    """The simpler effect leaves slightly more in every block, so chance does not explain the difference."""
     assert first_of(Made("rich", 2, (1.0, 1.0)), Made("simple", 1, (fitted, 1.03))) == first
 
 
@@ -383,7 +383,7 @@ def test_of_equal_curves_that_of_the_actuator_comes_first(others: str) -> None:
     ("held_out", "fitted", "first"), [(1.15, 0.4, "other"), (1.15, 0.6, "best"), (1.4, 0.4, "best")]
 )
 def test_a_small_lead_on_held_out_records_is_not_enough(held_out: float, fitted: float, first: str) -> None:
-    """Another effect, not found yet, rules those; what it hardly touches has been fitted far better by the other."""
+    """An effect not found yet rules held-out records; the other candidate fits far better what it hardly touches."""
     assert first_of(Made("best", 1, (1.0, 1.0)), Made("other", 5, (fitted, held_out))) == first
 
 
@@ -391,7 +391,7 @@ def test_a_small_lead_on_held_out_records_is_not_enough(held_out: float, fitted:
     ("left", "fitted", "follows"), [(0.304, 0.502, True), (0.304, 0.55, False), (0.33, 0.502, False)]
 )
 def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float, follows: bool) -> None:
-    """Five others come before it on held-out records, one of which leaves as much as it does."""
+    """Five candidates precede the twin on held-out records, one of which leaves as much as it does."""
 
     def screened(name: str, left: float, fitted: float = 0.6) -> Any:
         option = SimpleNamespace(name=name, label=name)
@@ -409,7 +409,7 @@ def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float
     ("numbers", "left", "follows"), [(1, 0.101, True), (1, 0.104, False), (2, 0.101, False), (3, 0.101, False)]
 )
 def test_a_simpler_shape_that_is_as_good_is_not_cut_off(numbers: int, left: float, follows: bool) -> None:
-    """Two richer shapes of the front leave a little less of the thinned records."""
+    """Two richer shapes of the front leave slightly smaller errors in the thinned records."""
 
     def screened(label: str, numbers: int, left: float) -> Any:
         option = SimpleNamespace(name="asymmetry", label=label)
@@ -421,7 +421,7 @@ def test_a_simpler_shape_that_is_as_good_is_not_cut_off(numbers: int, left: floa
 
 
 def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of three that held-out records find alike, one leaves far more of those it was fitted to."""
+    """Of three effects that held-out records do not tell apart, one leaves far more in the fitted records."""
 
     def made(name: str, fitted: float) -> Any:
         return SimpleNamespace(name=name, fitted=SimpleNamespace(rms=fitted))
@@ -432,14 +432,14 @@ def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.Mon
 
 
 def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:
-    """Of another effect it would be no merit; the simpler shape of the same one leaves twice as much without it."""
+    """For another effect it would be no merit; the simpler shape of the same effect leaves twice as much without it."""
     rich, simple = Made("rich", 9, (1.0, 1.0)), Made("simple", 2, (2.0, 2.0), (1.0, 1.0))
     assert first_of(rich, simple) == "simple"
     assert first_of(rich, simple, "creep") == "rich"
 
 
 def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
-    """Held-out records ruled by what another effect makes of their edges, of which fitted ones have hardly any."""
+    """Held-out records are ruled by another effect at their edges, of which fitted records have hardly any."""
     records: Any = SimpleNamespace(gap=1.0)
     assert selection.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
     assert selection.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
@@ -447,7 +447,7 @@ def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
 
 
 def test_nearly_all_that_is_left_is_worth_a_name() -> None:
-    """Beside a resonance of some hundred times the noise, say, of which another effect is a few per cent."""
+    """An example is an effect of a few per cent of a resonance that is some hundred times the noise."""
     records: Any = SimpleNamespace(gap=1.0)
     assert selection.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
     assert not selection.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
@@ -455,7 +455,7 @@ def test_nearly_all_that_is_left_is_worth_a_name() -> None:
 
 @pytest.mark.parametrize(("left", "first", "further"), [(0.6, True, True), (0.8, True, False), (0.9, False, False)])
 def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, further: bool) -> None:
-    """Of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
+    """From an error of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
     better = Made("better", 1, (left, left))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
     for bare, accepted in ((True, first), (False, further)):
@@ -466,7 +466,7 @@ def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])
 def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> None:
-    """The numbers of an effect come from records in which it makes no difference."""
+    """The numbers of the effect come from fitted records, in which it makes no difference."""
     now, better = Made("now", 1, (1.0, 1.0)), Made("better", 1, (fitted, 0.5))
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
@@ -475,7 +475,7 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
 
 @pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
 def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -> None:
-    """The hypothesis leaves more with the effect's small start states than with its own; the effect is to beat both."""
+    """The hypothesis leaves more with the effect's small start states than with its own; the effect must beat both."""
     now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
@@ -487,7 +487,7 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     [(0.59, [], False), (0.61, [], True), (0.59, ["lag"], False), (0.61, ["lag"], False), (0.65, ["lag"], True)],
 )
 def test_the_model_as_given_is_the_answer_where_it_does_better(left: float, names: list[str], given: bool) -> None:
-    """It leaves 0.6 of the held-out records: names have to do worse by a twentieth to fall."""
+    """The given model leaves 0.6 in held-out records; named effects are dropped if they do worse by a twentieth."""
     first, found = Made("given", 1, (1.0, 0.6)), Made("found", 1, (0.5, left))
     records: Any = SimpleNamespace(held=HELD, residual=lambda each: each.left[1])
     effects: Any = tuple(SimpleNamespace(name=name) for name in names)
@@ -498,7 +498,7 @@ def test_the_model_as_given_is_the_answer_where_it_does_better(left: float, name
 
 @pytest.mark.parametrize(("left", "names", "taken"), [(0.601, [], False), (0.605, [], True), (0.605, ["lag"], True)])
 def test_what_identify_finds_is_the_answer_where_it_does_better(left: float, names: list[str], taken: bool) -> None:
-    """It leaves 0.6 of the held-out records, and wins by more than equal errors differ, over names too."""
+    """The model of `identify` leaves 0.6 in held-out records; it wins, over names too, if the errors are not equal."""
     other, found = Made("identified", 1, (1.0, 0.6)), Made("found", 1, (0.5, left))
     records: Any = SimpleNamespace(held=HELD, residual=lambda each: each.left[1])
     effects: Any = tuple(SimpleNamespace(name=name) for name in names)
@@ -526,7 +526,7 @@ def test_what_identify_finds_is_the_answer_where_it_does_better(left: float, nam
 def test_a_number_at_an_end_of_its_range_explains_nine_tenths(
     fitted: float, held: float, most: bool, stand: bool
 ) -> None:
-    """As multiples of the noise, of a hundred times that: far above it, and nevertheless nearly all."""
+    """Errors are multiples of the noise, of a hundred times the noise: far above it, yet nearly all is explained."""
     now, none = Made("now", 1, (fitted * NOISE, held * NOISE), most=most), Made("none", 1, (100 * NOISE, 100 * NOISE))
     refused = selection.borne_out(now, none, RECORDS)  # type: ignore[arg-type]
     assert (refused is None) is stand
@@ -538,7 +538,7 @@ def test_a_number_at_an_end_of_its_range_explains_nine_tenths(
 
 @pytest.mark.parametrize(("within", "named"), [(0.5, True), (-0.5, False)])
 def test_an_effect_that_does_not_level_off_within_the_records_is_not_named(within: float, named: bool) -> None:
-    """A time constant of 1 s in records of 3 s and of 0.3 s, which takes 90 % of the error away."""
+    """A time constant of 1 s removes 90 % of the error in records of 3 s and in records of 0.3 s."""
     grown = Made("thermal", 1, (0.1, 0.1), levels_off=(0, within))
     best = screening.Tried(
         SimpleNamespace(name="thermal"), grown, ("thermal",), 0.1, grown.errors(RECORDS.held)  # type: ignore[arg-type]
@@ -550,7 +550,7 @@ def test_an_effect_that_does_not_level_off_within_the_records_is_not_named(withi
 
 
 def test_own_heat_has_to_level_off_within_the_session() -> None:
-    """Unlike a logged temperature, which a record shows whatever it does."""
+    """A logged temperature need not, since a record shows it whatever it does."""
     records, _ = of_warm(0.1)
     for shape in (SelfHeating, HysteresisHeating):
         for candidate in shape.candidates(records.known):
@@ -571,7 +571,7 @@ def warm(gain: float, seed: int) -> Item:
 
 
 def of_warm(gain: float) -> tuple[screening.Records, Fitted]:
-    """Two records to fit and one held out, and the effect at the end of its range: the only number of a gain."""
+    """Two records to fit and one held out, and a fit with the effect, whose gain is its only number."""
     to_fit, held = [warm(gain, 0), warm(gain, 1)], [warm(gain, 2)]
     structure = Structure(np.array([0.0, 10.0]), Kept())
     plain = fits.fit(structure, to_fit, np.empty(0), np.array([1.0, 0.5]))
@@ -582,7 +582,7 @@ def of_warm(gain: float) -> tuple[screening.Records, Fitted]:
 
 
 def test_a_wider_range_where_a_number_is_at_its_end() -> None:
-    """0.4 a degree lies beyond 0.2, as far as the first wider range reaches, 0.6; 0.1 is inside."""
+    """0.4 a degree lies beyond 0.2 and within the first wider range, which reaches 0.6; 0.1 is inside the usual one."""
     records, now = of_warm(0.4)
     assert now.actuator.effects[0].gain_per_degree == pytest.approx(0.2)  # type: ignore[attr-defined]
     wider = ranges.wider(now, records)
@@ -595,14 +595,14 @@ def test_a_wider_range_where_a_number_is_at_its_end() -> None:
     (end,) = ranges.ends(found, leaves, False)
     at = end.found
     assert (at.key, at.end, at.usual, at.why) == ("gain_per_degree", "largest", pytest.approx(0.2), "beyond")
-    assert fits.part_at_an_end(found, 0)  # it is no less unlikely for having been found
+    assert fits.part_at_an_end(found, 0)  # having been found makes it no less unlikely
     records, now = of_warm(0.1)
     assert ranges.wider(now, records) is None
     assert ranges.ends(now, None, True) == ()
 
 
 def test_a_wider_range_without_a_gain_on_held_out_records_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The records to fit alone are better with it; what it leaves is told."""
+    """Only the records to fit are better with it; the report says what it leaves."""
     records, now = of_warm(0.4)
     held = [warm(0.2, 2)]
     records = replace(records, held=held)
@@ -641,7 +641,7 @@ ABOUT = About((0.0, 100.0), 10.0, 1e-3, 1.0, 1.0, 1e4, 1e3, (0.0, 10.0, 20.0), f
 @pytest.mark.parametrize(
     ("kind", "shape", "at", "key", "farthest"),
     [
-        (RelaxingPlays, 1, 1, "exponent", 10.0),  # the schema's largest
+        (RelaxingPlays, 1, 1, "exponent", 10.0),  # the largest that the schema allows
         (ExponentialCreep, 0, 1, "weights", None),
         (PartMode, 0, 2, "share", 1.0),
     ],
@@ -649,7 +649,7 @@ ABOUT = About((0.0, 100.0), 10.0, 1e-3, 1.0, 1.0, 1e4, 1e3, (0.0, 10.0, 20.0), f
 def test_a_wider_range_ends_where_the_schema_does(
     kind: type[Effect], shape: int, at: int, key: str, farthest: float | None
 ) -> None:
-    """The effect at the wider end can be written, and a sixteenth of the way farther it could not."""
+    """The effect at the wider end can be written; a sixteenth of the way farther, it could not."""
     candidate = kind.candidates(ABOUT)[shape]
     numbers = candidate.start.copy()
     numbers[at] = candidate.high[at]
@@ -676,9 +676,9 @@ def test_a_wider_range_ends_where_the_schema_does(
 @pytest.mark.parametrize(
     ("bare", "names", "left", "without"),
     [
-        (0.97, ["lag"], 0.1, False),  # held-out records hardly prefer none
+        (0.97, ["lag"], 0.1, False),  # held-out records hardly prefer no front
         (0.9, ["lag"], 0.4, True),
-        (0.9, ["lag", "asymmetry"], 0.4, False),  # a front is found again, and does worse in the end
+        (0.9, ["lag", "asymmetry"], 0.4, False),  # a front is found again, which does worse in the end
         (0.9, ["lag", "asymmetry"], 0.2, True),
         (0.9, [], 0.4, False),
     ],
@@ -686,7 +686,7 @@ def test_a_wider_range_ends_where_the_schema_does(
 def test_a_front_that_misleads_held_out_records_is_left_out(
     bare: float, names: list[str], left: float, without: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the front the refit leaves 1, and 0.3 in the end; `left`: in the end without it."""
+    """With the front, the refit leaves 1 and the final fit 0.3; `left` is what the final fit without it leaves."""
     ready: Any = SimpleNamespace(held=HELD)
     refits = {"front": Made("front", 1, (0.3, 1.0)), "none": Made("none", 1, (1.0, bare))}
     ends = {"front": Made("front", 1, (0.2, 0.3)), "none": Made("none", 1, (0.2, left))}
@@ -707,6 +707,6 @@ def test_a_front_that_misleads_held_out_records_is_left_out(
 
 
 def test_a_parameter_that_only_the_search_has_is_said_to_be_one() -> None:
-    """The steepness of a piece of a sensor's curve, of which the parameter file has all values at once."""
+    """An example is the steepness of a piece of a sensor's curve, of which the parameter file has only the values."""
     end = AtEnd("", 3.0, ranges.LARGEST, 3.0, None, None, "limit")
     assert end.sentence("sensor_nonlinearity", "um").startswith("a parameter of the search of sensor_nonlinearity is 3")

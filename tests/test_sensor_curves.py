@@ -1,4 +1,4 @@
-"""Sensors whose curve is no polynomial: the curve itself, and that a diagnosis names it."""
+"""Sensors whose curve is not a polynomial: the curve itself, and its diagnosis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def curve(knots: tuple[float, ...], values: tuple[float, ...]) -> SensorCurve:
 
 
 def test_the_curve_is_that_of_another_library() -> None:
-    """With even knots the slopes of scipy's are the same harmonic means, except at both ends."""
+    """With even knots, scipy's slopes are the same harmonic means, except at both ends."""
     knots, values = np.linspace(-3.0, 5.0, 9), np.cumsum([0.0, 1.0, 0.2, 3.0, 0.7, 0.7, 2.0, 0.1, 1.0])
     y = np.linspace(knots[1], knots[-2], 1001)
     shown = curve(tuple(knots.tolist()), tuple(values.tolist())).mapped(y, Run(y, y))
@@ -60,7 +60,7 @@ SENSORS: dict[str, Callable[[Array], Array]] = {
     "arctangent": lambda x: np.arctan(2.0 * x) / 2.0,
     "root": lambda x: 2.0 * np.sqrt(0.85 + 0.5 * x),
 }
-"""Of an output between -1 and 1."""
+"""Sensor curves, for an output between -1 and 1."""
 
 R = np.linspace(0.0, 45.0, 61)
 P = np.concatenate([[1.0], 0.03 * np.exp(-(((R[1:] - 8.0) / 14.0) ** 2))])
@@ -84,7 +84,7 @@ def recorded(sensor: Callable[[Array], Array], number: int) -> Record:
     ("name", "named"), [("tanh", "saturation"), ("arctangent", "sensor_nonlinearity"), ("root", "sensor_nonlinearity")]
 )
 def test_a_sensor_with_any_curve_is_named(name: str, named: str) -> None:
-    """A tanh is the catalogue's own limit, which a sensor may have too; nothing is said to bend the plays."""
+    """A tanh is the catalogue's own limit, which a sensor may have too; no effect that bends the plays is named."""
     made = [recorded(SENSORS[name], number) for number in range(4)]
     found = hystgen.diagnose(hystgen.identify(made[:3], holdout=made[3:], model="pi"), made[:3], holdout=made[3:])
     assert [each["name"] for each in found.content["effects"]] == [named]

@@ -44,7 +44,7 @@ def made(folder: Path, **options: Any) -> Plan:
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory) -> Plan:
-    """For a DAC of 12 bits whose lowest code is 0 and whose range is wider than the drive's."""
+    """A plan for a 12-bit DAC whose lowest code is 0 and whose range is wider than the drive's."""
     return made(tmp_path_factory.mktemp("played"), dac_bits=12, dac_range=(-40.0, 160.0))
 
 
@@ -73,7 +73,7 @@ class TestDrives:
     def test_they_are_the_plan_s_to_a_code(
         self, tmp_path: Path, bits: int | None, ends: tuple[float, float] | None, coding: str, least: int
     ) -> None:
-        """Straight between the samples of the plan without a rate, within a code; of a record both clocks agree."""
+        """Drives are as long as those of the plan without a rate, and straight between their samples, to a code."""
         found = made(tmp_path, max_rate=2e3, dac_bits=bits, dac_range=ends, dac_coding=coding)
         plain = hystgen.plan(file_of(tmp_path), sample_time=1.0 / RATE, max_rate=2e3)
         code = 1e-6 * (HIGH - LOW) if ends is None or bits is None else (ends[1] - ends[0]) / 2**bits
@@ -124,7 +124,7 @@ class TestDrives:
 
     @pytest.mark.parametrize(("bits", "coding"), [(8, "straight"), (16, "twos-complement"), (32, "straight")])
     def test_firmware_plays_the_same_codes(self, tmp_path: Path, bits: int, coding: str) -> None:
-        """The player of the documentation, compiled as C, over the header that has the corners alone."""
+        """The player of the documentation, compiled as C, plays the codes from a header that has only the corners."""
         found = made(tmp_path, dac_bits=bits, dac_range=(-25.0, 125.0), dac_coding=coding)
         tables = found.tables()
         page = (Path(hystgen.__file__).parents[1] / "docs" / "howto" / "acquire.md").read_text()
@@ -158,7 +158,7 @@ int main(void) { play(print); return 0; }
 class TestCut:
     @pytest.mark.parametrize(("rate", "early"), [(RATE, 0.0), (73.0, 4.2), (211.0, -0.3)])
     def test_a_recording_on_another_clock(self, played: Plan, rate: float, early: float) -> None:
-        """Started before the drive or just behind its first sample, at another rate, with noise and a gain of 1.01."""
+        """Recordings start before the drive or just after its first sample, at another rate, with noise and a gain."""
         session, (t, v) = parts_of(played), whole(played)
         clock = np.arange(-early, t[-1] + 1.0, 1.0 / rate)
         drive = 1.01 * np.interp(clock, t, v) + np.random.default_rng(1).normal(0.0, 0.05, len(clock))
@@ -269,7 +269,7 @@ class TestCommand:
     def test_the_command_of_the_plan_cuts_the_recording(
         self, tmp_path: Path, run: Call, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Every record goes where the plan has it, with its history and rest."""
+        """Every record is fitted or held out as the plan says, with its history and rest."""
         folder = tmp_path / "plan"
         words = ["--rate", RATE, "--dac-bits", "16", "--dac-range", "-30,130", "--dac-coding", "twos-complement"]
         code, _, err = run("diagnose", "--plan", file_of(tmp_path), *words, "-o", folder)
@@ -325,7 +325,7 @@ class TestCommand:
 
 
 def test_from_a_plan_to_a_diagnosis_in_one_run(tmp_path: Path) -> None:
-    """The example, as it is: codes through the two functions of its hardware, and the creep of its bench comes back."""
+    """The example runs unchanged: codes pass the two functions of its hardware, and the creep of its bench is found."""
     command = [sys.executable, str(EXAMPLE), "-o", str(tmp_path / "out"), "--rate", "100"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     plan, found = done.stdout.splitlines()

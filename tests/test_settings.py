@@ -1,4 +1,4 @@
-"""What `identify` keeps of the parameter file that it replaces, and what it finds out before a fit."""
+"""Settings that `identify` keeps from the parameter file that it replaces, and its checks before a fit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EFFECTS = "  effects:\n    - {name: lag, time_constant: 0.01}\n    - {name: 'use
 
 
 def identified(target: Path, run: Run, *more: object, record: Path = RECORDING) -> tuple[Any, str]:
-    """The parameters written, and what was said."""
+    """The parameters written, and the messages."""
     code, _, err = run("identify", record, "-o", target, "--thresholds", 4, *more)
     assert code == 0, err
     return load_parameters(target), err
@@ -70,7 +70,7 @@ def test_what_is_given_goes_first(tmp_path: Path, run: Run) -> None:
 
 
 def test_effects_of_the_file_that_is_replaced_are_left_out_aloud(tmp_path: Path, run: Run) -> None:
-    """Also where one is the user's own, which only --effects could explain."""
+    """A user effect, which only --effects could define, is left out as well."""
     target = tmp_path / "other.yaml"
     target.write_text(OLD.replace("emit:", EFFECTS + "emit:"))
     found, said = identified(target, run)
@@ -98,7 +98,7 @@ def test_an_empty_file_is_no_news(tmp_path: Path, run: Run) -> None:
 
 
 def test_a_fleet_keeps_them_too(tmp_path: Path, run: Run) -> None:
-    """Written into a unit's file they are kept, reach its C, and are no reason to do it again."""
+    """Settings written into a unit's file are kept, reach its C, and cause no further refit."""
     (tmp_path / "units").mkdir()
     for name in ("one", "two"):
         (tmp_path / "units" / f"{name}.csv").write_bytes(RECORDING.read_bytes())
@@ -119,7 +119,7 @@ def test_a_fleet_keeps_them_too(tmp_path: Path, run: Run) -> None:
 
 @pytest.fixture
 def no_fit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fails where a record is fitted."""
+    """Fail if a record is fitted."""
 
     @functools.wraps(identification.identify)
     def identify(*_: object, **__: object) -> None:
@@ -139,7 +139,7 @@ def unwritable(tmp_path: Path) -> list[Path]:
 
 @pytest.mark.usefixtures("no_fit")
 def test_what_cannot_be_written_is_found_before_the_fit(tmp_path: Path, run: Run) -> None:
-    """Exit code 2, and the place is named."""
+    """The exit code is 2, and the message names the place."""
     good = tmp_path / "a.yaml"
     for folder in unwritable(tmp_path):
         plot, report = ("--plot", folder / "a.svg"), ("--report", folder / "fit")

@@ -1,4 +1,4 @@
-"""Settling after a step, against closed forms, scipy's linear systems and a step on a fine even grid."""
+"""Settling after a step, compared with closed forms, scipy's linear systems and a step on a fine even grid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOW, HIGH = -20.0, 80.0
 THRESHOLDS, WEIGHTS = (0.0, 5.0, 12.0), (0.1, 0.03, 0.02)
 STEP = HIGH - LOW
 PLAYED = sum(p * (STEP - 2.0 * r) for p, r in zip(WEIGHTS, THRESHOLDS, strict=True))
-"""Output step of the plays: each waits until the drive has crossed it."""
+"""Output step of the plays: each moves once the drive has moved by twice its threshold."""
 
 
 def file_of(folder: Path, *effects: str, plays: bool = True) -> Path:
@@ -38,7 +38,7 @@ def model_of(folder: Path, *effects: str, plays: bool = True) -> Model:
 
 
 def root(left: Callable[[float], float], longest: float = 1e4) -> float:
-    """When a falling function of time crosses 0."""
+    """Time at which a falling function crosses 0."""
     return float(optimize.brentq(left, 1e-9, longest, xtol=1e-12))
 
 
@@ -60,7 +60,7 @@ def test_behind_a_lag_plays_follow_its_end(tmp_path: Path) -> None:
     ("frequency", "damping", "within"), [(350.0, 0.02, 0.01), (12.0, 0.3, 1e-3), (2e3, 0.005, 0.03), (50.0, 2.0, 0.01)]
 )
 def test_a_mode_settles_as_scipy_has_it(tmp_path: Path, frequency: float, damping: float, within: float) -> None:
-    """The last time outside: a peak that just exceeds the error, or just does not, is half a period."""
+    """The last time outside counts; a peak just above or just below the error shifts it by half a period."""
     found = model_of(tmp_path, f"name: resonance, frequency: {frequency}, damping: {damping}").settling(within)
     w0 = 2.0 * math.pi * frequency
     slowest = damping if damping < 1.0 else damping - math.sqrt(damping**2 - 1.0)
@@ -89,7 +89,7 @@ def test_creep_of_a_few_states(tmp_path: Path) -> None:
 
 
 def test_creep_along_the_logarithm(tmp_path: Path) -> None:
-    """Of an even spectrum `g/ln(10) (E1(t/t_max) - E1(t/t_min))` of the step at t_0 is left."""
+    """An even spectrum leaves `g/ln(10) (E1(t/t_max) - E1(t/t_min))` of the step at t_0."""
     spectrum = "t0: 0.1, t_min: 1.0e-4, t_max: 1.0e+3"
     model = model_of(tmp_path, f"name: creep, shape: logarithmic, per_decade: 0.02, {spectrum}")
 
@@ -119,7 +119,7 @@ def test_viscous_plays(tmp_path: Path) -> None:
 
 
 def test_a_nonlinear_dashpot(tmp_path: Path) -> None:
-    """`e' = -(r_n/tau) (e/r_n)^2` falls as 1/t."""
+    """With `e' = -(r_n/tau) (e/r_n)^2`, e falls as 1/t."""
     tau, r_n = 4e-3, THRESHOLDS[-1]
     found = model_of(
         tmp_path, f"name: rate_dependence, shape: relaxation, time_constant: {tau}, exponent: 2.0"
@@ -158,7 +158,7 @@ def test_creep_that_goes_on_for_longer_than_an_hour(tmp_path: Path) -> None:
 
 
 def test_a_light_mode_that_rings_for_too_many_periods(tmp_path: Path) -> None:
-    """What is said is true all the same: by then it has not settled."""
+    """The statement is true nevertheless: after the time that was followed, it has not settled."""
     found = model_of(tmp_path, "name: resonance, frequency: 1.0e+3, damping: 1.0e-6").settling()
     assert found.seconds == math.inf
     assert 0.0 < found.followed < math.log(100.0) / (1e-6 * 2.0 * math.pi * 1e3)

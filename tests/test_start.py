@@ -1,4 +1,4 @@
-"""Records without a history: start memories that are found, loops that run the other way, points without a time."""
+"""Records without a history: estimated start memories, loops that run the other way, points without a time."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ WEIGHTS = (1.0, *(0.2 * np.exp(-np.arange(9) / 4.0)).tolist())
 
 @pytest.fixture(scope="module")
 def bench() -> ModuleType:
-    """benchmarks/start_memory.py"""
+    """The module benchmarks/start_memory.py."""
     path = Path(__file__).resolve().parents[1] / "benchmarks" / "start_memory.py"
     spec = importlib.util.spec_from_file_location("bench_start_memory", path)
     assert spec
     assert spec.loader
     made = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = made
-    sys.path.insert(0, str(path.parent))  # as for a program: others stand beside it
+    sys.path.insert(0, str(path.parent))  # as for a program, which imports modules next to it
     try:
         spec.loader.exec_module(made)
     finally:
@@ -46,7 +46,7 @@ def legs(turns: list[float], step: float = 1.5) -> Array:
 
 
 def growing() -> Array:
-    """Amplitudes that grow to the end around a drive that is not 0."""
+    """Amplitudes around a drive that is not 0, growing to the end."""
     return legs([45.0, *(x for k in range(1, 10) for x in (45.0 + 5.0 * k, 45.0 - 4.0 * k))])
 
 
@@ -67,7 +67,7 @@ class TestMemory:
 
     @pytest.mark.parametrize("seed", range(4))
     def test_what_a_memory_leaves(self, seed: int) -> None:
-        """With known weights: the sum of squares of a brute run of the plays from that memory, with the best offset."""
+        """With known weights: the root sum of squares of a brute-force run from that memory, with the best offset."""
         rng = np.random.default_rng(seed)
         v = (growing if seed % 2 else never_twice)()
         y = rng.standard_normal(len(v))
@@ -84,7 +84,7 @@ class TestMemory:
     @pytest.mark.parametrize("before", [(), (100.0,), (110.0, -5.0), (-20.0, 75.0, 30.0)])
     @pytest.mark.parametrize("drive", [growing, never_twice])
     def test_costs_no_more_than_a_tenth(self, drive: object, before: tuple[float, ...]) -> None:
-        """Held-out error, on a record whose history is known, of models fitted with the true history and without."""
+        """Models fitted with and without the true history are compared on a held-out record of known history."""
         v = drive()  # type: ignore[operator]
         memory = brute_plays([*before, v[0]], PLACES, 0.0)[-1]
         y = noisy(brute_output(v, PLACES, WEIGHTS, memory), 0.2)
@@ -106,9 +106,9 @@ class TestMemory:
     @pytest.mark.thorough(but_one_in=2)
     @pytest.mark.parametrize("drive", ["one way", "never twice"])
     def test_costs_no_more_than_a_tenth_of_other_hysteresis(self, drive: str, bench: ModuleType) -> None:
-        """Plants that are no play sums; held-out loops stay inside the fitted range, or take all of it.
+        """The plants are not play sums; held-out loops stay inside the fitted range, or cover all of it.
 
-        It cost 1.8 and 4.1 times when only plays were fitted that move there and back from a start at rest.
+        The cost was 1.8 and 4.1 times when only plays that move there and back from a start at rest were fitted.
         """
         found = []
         for seed in range(3):
@@ -118,7 +118,7 @@ class TestMemory:
         assert np.max(np.median(found, axis=0)) <= bench.COST
 
     def test_of_an_actuator_that_came_from_a_wider_range(self) -> None:
-        """Its widest plays move once: as much of the output as they add is left where the model has none for them."""
+        """The widest plays move only once: if the model has none for them, what they add to the output is left."""
         places, weights, noise = np.linspace(0.0, 60.0, 13), (1.0, *[0.04] * 12), 0.05
         v = growing()
         memory = brute_plays([-100.0, 120.0, 20.0, v[0]], places, 0.0)[-1]
@@ -126,10 +126,10 @@ class TestMemory:
         for count in (None, 8):
             fit = hystgen.identify(record(v, y), thresholds=count)
             assert count is None or len(fit.parameters.model.pi.thresholds) == count + 1
-            assert fit.rows[-1].rms < 2.0 * noise  # 1.3 times; else 4.2
+            assert fit.rows[-1].rms < 2.0 * noise  # 1.3 times; without such plays 4.2
 
     def test_of_plays_that_seldom_turn(self) -> None:
-        """The widest move down by a few volts at the end, and up once behind the unknown start."""
+        """The widest plays move down by a few volts at the end, and up once after the unknown start."""
         v = legs([0.0, 90.0, 30.0, 70.0, 20.0, 80.0, 40.0, 60.0, 3.0, 80.0, 10.0, 98.0, 0.0, 50.0])
         places, weights = (0.0, 5.0, 15.0, 30.0, 41.0), (1.0, 0.2, 0.2, 0.15, 0.15)
         fit = hystgen.identify(record(v, noisy(brute_output(v, places, weights, 0.0), 0.1)))
@@ -176,7 +176,7 @@ def iron(v: Array) -> Array:
 
 
 SWEEP = legs([0.0, 100.0, -100.0, 100.0, -60.0, 80.0, -100.0, 100.0], 0.5)
-"""Settled loops with turns inside them, behind a first loading."""
+"""Settled loops with turns inside them, after a first loading."""
 
 DRIVES = {
     "loops": SWEEP,
@@ -192,7 +192,7 @@ def clockwise(v: Array, y: Array) -> bool:
 
 
 class TestDirection:
-    """Recorded loops whose direction is known from what made them."""
+    """Recorded loops whose direction is known from the plant that made them."""
 
     @pytest.mark.parametrize("drive", DRIVES)
     def test_of_loops_with_noise(self, drive: str) -> None:
@@ -218,7 +218,7 @@ class TestDirection:
 
     @pytest.mark.parametrize("late", [-5, -3, 3, 5, 10])
     def test_of_loops_beside_a_lag(self, late: int) -> None:
-        """Fast loops are wide because of the lag alone, and run as it says; the slow ones tell."""
+        """Fast loops are wide only because of the lag and run its way; slow loops show the way of the hysteresis."""
         t = np.linspace(0.0, 10.0, 4000)
         v = 100.0 * np.sin(2.0 * np.pi * (0.2 * t + 0.2 * t**2))
         k = np.arange(len(t))
@@ -226,7 +226,7 @@ class TestDirection:
         assert clockwise(v, np.interp(k - late, k, ahead(v)))
 
     def test_of_lines_and_curves(self) -> None:
-        """No hysteresis, so that any direction is one of the noise."""
+        """There is no hysteresis, so any direction would be one of the noise."""
         for seed in range(30):
             noise = np.random.default_rng(seed).standard_normal(len(SWEEP))
             for y in (SWEEP, 100.0 * np.tanh(SWEEP / 30.0)):
@@ -235,7 +235,7 @@ class TestDirection:
     @pytest.mark.parametrize("drive", ["loops", "random turns"])
     @pytest.mark.parametrize("way", [behind, ahead, iron])
     def test_of_a_butterfly(self, drive: str, way: Callable[[Array], Array]) -> None:
-        """Its wings run opposite ways."""
+        """The wings of a butterfly run opposite ways."""
         v = DRIVES[drive] - np.mean(DRIVES[drive])
         assert not clockwise(v, way(v) ** 2)
 
@@ -248,7 +248,7 @@ class TestDirection:
 
 class TestSense:
     def test_clockwise_loops_are_told(self) -> None:
-        """A force ahead of its displacement; the exchanged columns are fitted."""
+        """A force ahead of its displacement is reported, and its columns fit well when exchanged."""
         x = never_twice()
         force = noisy(1.5 * x - brute_output(x, (0.0, 10.0), (0.0, 1.0), 50.0), 0.05)
         fit = hystgen.identify(record(x, force))
@@ -259,7 +259,7 @@ class TestSense:
         assert exchanged.rows[-1].rms < 0.1 * fit.rows[-1].rms * np.ptp(x) / np.ptp(force)
 
     def test_loops_that_saturate_are_not_clockwise(self) -> None:
-        """Weights of either sign follow the saturation, and those that are negative say nothing of the direction."""
+        """Weights of either sign model the saturation, so negative ones say nothing about the direction."""
         loops = []
         for top in (32.0, 160.0):
             v = np.append(0.0, top * np.cos(np.linspace(0.0, 4.0 * np.pi, 513)))
@@ -274,7 +274,7 @@ class TestSense:
 
 class TestPoints:
     def test_without_a_time(self, tmp_path: Path) -> None:
-        """120 points: fitted, and an effect that does not depend on time is found, none that does is sought."""
+        """120 points are fitted; an effect that does not depend on time is found, and none that does is sought."""
         v = legs([20.0, 80.0, 0.0, 100.0, 10.0, 90.0, 20.0, 80.0, 0.0, 100.0], 6.0)
         bent = 100.0 * np.expm1(v / 60.0) / np.expm1(100.0 / 60.0)
         y = noisy(brute_output(bent, (0.0, 5.0, 15.0), (1.0, 0.4, 0.3), bent[0]), 0.2)
@@ -304,7 +304,7 @@ class TestPoints:
 
 
 def test_skip_is_in_seconds() -> None:
-    """Samples come every millisecond; the drive of those that are not compared counts."""
+    """Samples come every millisecond; the drive of skipped samples still moves the plays."""
     v = never_twice()
     y = brute_output(v, PLACES, WEIGHTS, 0.0)
     y[:100] = -500.0

@@ -1,4 +1,4 @@
-"""Start memories that are found again beside the effects of a hypothesis."""
+"""Start memories that are estimated again together with the effects of a hypothesis."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from hystgen.identification.joint import Kept
 from hystgen.records import Record
 
 NOISE, BEND = 0.1, 0.08
-"""[output units] of the records, and [share of the range] of the sensor at its end."""
+"""[output units] Noise of the records, and [share of the range] bend of the sensor at its end."""
 
 
 def test_a_memory_is_found_again_beside_a_sensor() -> None:
-    """The memory is that of a stage that came from elsewhere; the bare model bends it to follow the sensor.
+    """The memory is that of a stage that came from elsewhere; the bare model distorts it to follow the sensor.
 
-    The record's amplitude grows to its end, so that hardly any of it is known without a memory.
+    The record's amplitude grows to its end, so hardly any of the record can be used without a memory.
     """
     before = np.array([0.0, 100.0, 15.0, 80.0, 35.0])
     growing = 50.0 - np.linspace(10.0, 50.0, 400) * np.cos(np.linspace(0.0, 10.0 * np.pi, 400))

@@ -1,4 +1,4 @@
-"""Free responses to an unknown start state, whose factors have limits, in the fit of a hypothesis."""
+"""Free responses to an unknown start state, with limited factors, in the fit of a hypothesis."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ THRESHOLDS = np.array([0.0, 10.0, 25.0])
 """[V] of plays that move in a drive of 100 V"""
 
 TAUS, SHARES = (0.1, 0.7), (0.03, 0.02)
-"""[s] and [of the play sum], of creep: records of 2 s show both time constants, and shares as stages have them."""
+"""[s] and [of the play sum], of creep: records of 2 s show both time constants; the shares are usual for stages."""
 
 NOISE = 0.2
-"""[output units] of the records, a fifth of a per cent of their range: limits that are missed cost far more."""
+"""[output units] of the records, a fifth of a per cent of their range: a missed limit costs far more."""
 
 SPAN = 2.0
-"""[times the drive range] Where the start state may come from, as `START_SPAN` has it."""
+"""[times the drive range] Span from which the start state may come, as in `START_SPAN`."""
 
 
 def _creep(x: Array) -> ExponentialCreep:
@@ -107,7 +107,7 @@ def _played(v: Array, t: Array, p: Array, effect: ExponentialCreep) -> Array:
 
 @pytest.mark.parametrize(("strength", "beyond"), [(0.5, False), (2.0, True), (5.0, True)])
 def test_weights_beside_limited_start_responses_are_the_best(strength: float, beyond: bool) -> None:
-    """The fit has the error of another formulation, and so has the error by which hypotheses are judged."""
+    """The error of the fit, and the error by which hypotheses are judged, are those of another formulation."""
     shape = CREEP.candidate.start
     with jit.plain():
         records = items(strength, 3)
@@ -123,7 +123,7 @@ def test_weights_beside_limited_start_responses_are_the_best(strength: float, be
 
 @pytest.mark.parametrize("seed", [9, 268, 274, 1, 2])
 def test_nearly_equal_responses(seed: int) -> None:
-    """Two responses that are nearly the same have large factors of either sign; the first ones go from side to side."""
+    """Nearly equal responses have large factors of opposite signs, which go from side to side for the first seeds."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-1.5, 0.5) + np.array([0.0, rng.uniform(0.02, 0.3)])
     shape = np.array([*places, *10.0 ** rng.uniform(-3.0, -1.0, 2)])
@@ -139,7 +139,7 @@ def test_nearly_equal_responses(seed: int) -> None:
 
 @pytest.mark.parametrize("strength", [0.5, 5.0])
 def test_weights_that_suit_the_start_of_another_model(strength: float) -> None:
-    """Plays without creep, with the responses to a start that creep leaves free: the least error there is."""
+    """Plays without creep, given the start responses that creep leaves free, reach the least possible error."""
     shape = CREEP.candidate.start
     with jit.plain():
         records = items(strength, 5)
@@ -157,7 +157,7 @@ def test_weights_that_suit_the_start_of_another_model(strength: float) -> None:
 
 
 def test_derivatives_follow_the_limits() -> None:
-    """The gradient of the least error is that of the best weights and factors: by differences of whole fits."""
+    """The gradient of the least error, at the best weights and factors, agrees with differences of whole fits."""
     shape = CREEP.candidate.start
     with jit.plain():
         records = items(5.0, 4)
@@ -175,7 +175,7 @@ def test_derivatives_follow_the_limits() -> None:
 
 
 def test_a_start_behind_a_sensor_has_the_same_limits() -> None:
-    """A sensor bends the response too: its offset is found with it, which must not double what the limits allow."""
+    """A sensor bends the response too, with an offset that is found; this must not double what the limits allow."""
     bent = kept(SensorPolynomial(name="sensor_nonlinearity", coefficients=(0.1,), scale=150.0))
     straight = kept(SensorPolynomial(name="sensor_nonlinearity", coefficients=(1e-9,), scale=150.0))
     with jit.plain():

@@ -1,4 +1,4 @@
-"""The static checks find what they are there to find, and look at every kind of module."""
+"""The static checks find planted defects and look at every kind of module."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hystgen.emission.options import LAYOUTS
 
 pytestmark = pytest.mark.thorough
 
-# A defect of each kind in C that compiles clean
+# A defect of each kind in C that compiles without warnings
 DEFECTS = {
     "cppcheck": ("arrayIndexOutOfBounds", "int f(void)", "int a[2] = {1, 2};\n    return a[2];"),
     "misra": ("15.1", "int f(int x)", "if (x > 0) {\n        goto out;\n    }\nout:\n    return x;"),

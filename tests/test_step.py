@@ -1,4 +1,4 @@
-"""What a step, a commit and a reset mean, against the contract's words played out with plain plays and bisection."""
+"""Steps, commits and resets do what the contract says, which is played out here with plain plays and bisection."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Actuator:
 
     def front_inverse(self, w: float) -> float:
         if not any(isinstance(stage, TanhEnvelope) for stage in self.model.stages):
-            # what the map does outside the range is nobody's business: its ends go on straight
+            # the map outside the range does not matter: its ends go on straight
             for end, inside in ((self.low, self.low + 1e-3), (self.high, self.high - 1e-3)):
                 slope = (self.front(end, True) - self.front(inside, True)) / (end - inside)
                 if (w - self.front(end, True)) / slope * (end - inside) >= 0:
@@ -138,13 +138,13 @@ class Compensator:
         a = self.plant
         first = True if limited > self.level else False if limited < self.level else a.up
         self.level = limited
-        # On one curve both directions meet in the drive as it is; with two, each reaches down or up to its own end
+        # With one curve, both directions meet at the present drive; with two, each extends down or up to its own end
         ways = {True: (a.drive, max(a.drive, a.high) + 0.9), False: (min(a.drive, a.low) - 0.9, a.drive)}
         if not self.plant.model.branches_differ:
             first = limited >= a.would_give(a.drive, a.up)
         for up in (first, not first):
             low, high = ways[up]
-            # more than a branch ever gives is a drive beyond the range, in the branch's own direction
+            # a reference beyond all that a branch gives needs a drive beyond the range, in the branch's own direction
             if limited >= a.would_give(low, up) - CLOSE if up else limited <= a.would_give(high, up) + CLOSE:
                 v = bisect(lambda x, up=up: a.would_give(x, up), limited, low, high)
                 break
@@ -162,8 +162,8 @@ def load(name: str) -> Cascade:
 
 @st.composite
 def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
-    """Operations with an argument in parts of the range; the odd NaN, infinity, repetition and excess, and some whose
-    status stays unread."""
+    """Operations with arguments as shares of the range; some are NaN, infinite, repeated or out of range, and some
+    leave the status unread."""
     length = draw(st.integers(1, 60))
     seed = draw(st.integers(0, 2**32 - 1))
     rng = np.random.default_rng(seed)
@@ -285,7 +285,7 @@ def test_the_same_input_again_gives_the_same_bits(name: str, arithmetic: str) ->
 
 @pytest.mark.parametrize("name", FILES)
 def test_output_range_is_what_histories_can_reach(name: str) -> None:
-    """No drive history leaves the range, and some come as close to its ends as one likes."""
+    """No drive history leaves the range, and some histories come arbitrarily close to its ends."""
     model = load(name)
     low, high = model.output_range
     a = Actuator(model)
@@ -306,7 +306,7 @@ def test_output_range_is_what_histories_can_reach(name: str) -> None:
 
 
 def test_saturation_does_not_corrupt_the_memory() -> None:
-    """After references far beyond the range the plant follows exactly as soon as they come back."""
+    """After references far beyond the range, the plant follows exactly as soon as they return."""
     model = load("plain")
     low, high = model.output_range
     k = np.linspace(0, 12 * np.pi, 3000)

@@ -14,7 +14,7 @@ from hystgen.basics.structures import Count, Factor, FourInt32, Real, Struct, me
 
 
 class Inner(Struct):
-    """What `Outer` begins with."""
+    """The part that `Outer` begins with."""
 
     high: Real
 

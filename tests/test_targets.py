@@ -45,7 +45,7 @@ def model(name: str) -> Model:
 
 @pytest.fixture
 def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[[str], str]], None]:
-    """Lets a test change the emitted file of that ending before it is compiled."""
+    """Let a test change the emitted file with this ending before it is compiled."""
     emitted = module.files
 
     def change(ending: str, how: Callable[[str], str]) -> None:
@@ -62,7 +62,7 @@ def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[[str],
 
 @pytest.fixture(scope="module")
 def bench() -> ModuleType:
-    """benchmarks/targets.py"""
+    """The module benchmarks/targets.py."""
     path = Path(__file__).resolve().parents[1] / "benchmarks" / "targets.py"
     spec = importlib.util.spec_from_file_location("bench_targets", path)
     assert spec
@@ -90,9 +90,9 @@ def test_ci_has_the_second_compiler_and_emulator() -> None:
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
 def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> None:
-    """Corners with every compiler and emulator there is, loop with zig; rows as promised, and all figures in them.
+    """Corners run with every compiler and emulator installed, loop with zig; the rows are complete, with all figures.
 
-    Each model with one engine; HYSTGEN_WHOLE=1 runs both with both."""
+    Each model runs with one engine; HYSTGEN_WHOLE=1 runs both with both."""
     compiler = [] if engine == "corners" else ["zig"]
     report = hystgen.verify(
         model(name), operator="both", engine=engine, targets=CORES, compiler=compiler, target_length=700
@@ -131,9 +131,9 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
 def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(
     name: str, arithmetic: str, engine: str, operator: str
 ) -> None:
-    """Whatever is called, with every compiler and build; float64, without FPU there, needs more.
+    """Every call, compiler and build needs at most that; float64, for which this core has no FPU, needs more.
 
-    An operator alone is inlined in other ways than both.
+    A single operator is inlined differently from both.
     """
     report = hystgen.verify(
         model(name), operator=operator, arithmetic=arithmetic, engine=engine, targets=["cortex-m4f"], target_length=500
@@ -157,7 +157,7 @@ def with_plays(name: str, plays: int) -> Model:
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
 def test_nor_do_loops_that_are_unrolled(name: str, arithmetic: str, plays: int) -> None:
-    """A compiler that takes all plays at once, up to nine of them, would like all their products at once too."""
+    """A compiler that unrolls up to nine plays would like to keep all their products at once, too."""
     several = with_plays(name, plays)
     report = hystgen.verify(
         several, operator="both", arithmetic=arithmetic, engine="loop", targets=["cortex-m4f"], target_length=500
@@ -168,7 +168,7 @@ def test_nor_do_loops_that_are_unrolled(name: str, arithmetic: str, plays: int) 
 
 def frames_and_calls(compiler: cross.CrossCompiler, source: Path) -> tuple[dict[str, int], dict[str, set[str]]]:
     """Bytes of each function's frame, as the compiler says, and what it calls, by the relocations of the object: each
-    function is in a section of its own. A jump to another function counts as a call, after which nothing is left."""
+    function is in a section of its own. A jump to another function counts as a call that keeps no frame."""
     from elftools.elf.elffile import ELFFile
 
     place = source.with_suffix(f".{compiler.name}")
@@ -189,7 +189,7 @@ def frames_and_calls(compiler: cross.CrossCompiler, source: Path) -> tuple[dict[
             for entry in section.iter_relocations() if caller in frames else ():
                 kind = {10: "", 30: "jump "}.get(entry["r_info_type"])  # R_ARM_THM_CALL, R_ARM_THM_JUMP24
                 symbol = symbols.get_symbol(entry["r_info_sym"])
-                if kind is not None:  # two functions with the same code may be one, in the section of either
+                if kind is not None:  # functions with the same code may be merged, in the section of either
                     known = symbol["st_shndx"] != "SHN_UNDEF"
                     name = elf.get_section(symbol["st_shndx"]).name.removeprefix(".text.") if known else symbol.name
                     calls[caller].add(kind + whole(name))
@@ -218,16 +218,16 @@ WITH_BRAKES = CHAINS | {"braked": BRAKED, "steady": STEADY, "calm": CALM}
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", WITH_BRAKES)
 def test_models_with_effects_need_at_most_128_bytes_of_stack(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """On a Cortex-M4F: the deepest chain of calls of any function of the interface, whatever record would reach it."""
+    """On a Cortex-M4F, this is the deepest chain of calls from any function of the interface, reached or not."""
     operators = ("inverse",) if name in INVERSE_ALONE else ("both", "inverse")
     used = stack(tmp_path, WITH_BRAKES[name], arithmetic, "loop", operators)
     assert max(used.values()) <= 128, used
 
 
 CORNER_STACK = {("led", "q31"): 136, ("everything", "q31"): 136, ("everything", "float32"): 136}
-"""The same of engine corners, with zig; with gcc these take 16, 24 and 68 bytes less. In q31 a search for a kink takes
-64 bytes, below those of a step, or of `settle`, and of the plays that are solved for; in floating point the drive in
-front of two branches takes 72, below those of a step."""
+"""Stack with engine corners and zig; gcc needs 16, 24 and 68 bytes less. In q31 a search for a kink takes 64 bytes on
+top of those of a step, or of `settle`, and of the plays that are solved for; in floating point the drive in front of
+two branches takes 72 on top of those of a step."""
 
 
 @pytest.mark.slow(one_in=3)
@@ -253,7 +253,7 @@ def stack(
             frames, calls = frames_and_calls(cross.find(target, compiler), source)
             called = {each.removeprefix("jump ") for every in calls.values() for each in every}
             assert len(called) > 2
-            assert all(each.startswith("__aeabi_") for each in called - frames.keys())  # divides, where a gain is set
+            assert all(each.startswith("__aeabi_") for each in called - frames.keys())  # division, where a gain is set
             used[operator, compiler] = max(deepest(each, frames, calls) for each in frames)
     return used
 
@@ -274,17 +274,17 @@ def test_one_changed_table_entry_is_found_on_a_core(core: str, changed_c: Callab
 
 @pytest.mark.parametrize("core", ["cortex-m4f", "cortex-m7", "cortex-m33", "rv32imafc"])
 def test_contraction_is_found_on_cores_that_can(core: str, changed_c: Callable[..., None]) -> None:
-    """Without the pragmas of the emitted C a user's flags would change bits: the build called defaults shows it."""
+    """Without the pragmas of the emitted C, users' flags would change bits; the build called defaults shows it."""
     changed_c("listed.c", lambda text: re.sub("(?m)^#pragma.*$", "", text))
     report = hystgen.verify(model("listed"), operator="both", targets=[core], target_length=1000)
     wrong = {(row.compiler, row.build) for row in report.rows if row.different}
-    names = ["zig"] if core in ("cortex-m7", "rv32imafc") else []  # LLVM holds fused operations of M4 and M33 for slow
+    names = ["zig"] if core in ("cortex-m7", "rv32imafc") else []  # LLVM considers fused operations slow on M4 and M33
     names += ["gcc"] if shutil.which(targets.find(core).gcc) else []
     assert wrong == {(name, "defaults") for name in names}, report.table()
 
 
 def test_a_self_test_that_fails_on_the_core_is_found(changed_c: Callable[..., None]) -> None:
-    """By its result on the emulated core, and where qemu is there by the exit code of a whole firmware."""
+    """The result on the emulated core shows it and, if qemu is installed, the exit code of a whole firmware."""
     changed_c("plain_selftest.c", lambda text: re.sub(r"(\{'s', [^,]+, )-?[\d.e-]+f", r"\g<1>77.0f", text, count=1))
     report = hystgen.verify(model("plain"), targets=["cortex-m4f"], target_length=100)
     failed = {(row.build, row.operator, row.error) for row in report.rows if not row.ok}
@@ -314,7 +314,7 @@ def test_the_self_test_passes_where_an_int_has_16_bits(name: str, arithmetic: st
 
 AVR_DIALECTS = (
     ("avr-gcc", "gnu89"), ("avr-gcc", "gnu99"),
-    (AVR_CXX, "gnu++98"), (AVR_CXX, "gnu++11"), (AVR_CXX, "gnu++1z"),  # avr-g++ 5.4 calls C++17 so
+    (AVR_CXX, "gnu++98"), (AVR_CXX, "gnu++11"), (AVR_CXX, "gnu++1z"),  # the name of C++17 in avr-g++ 5.4
 )  # fmt: skip
 
 
@@ -325,7 +325,7 @@ AVR_DIALECTS = (
 def test_compiles_for_the_avr_in_every_dialect(
     name: str, engine: str, arithmetic: str, layout: str, tmp_path: Path
 ) -> None:
-    """As C and as C++, which an Arduino sketch is: the emitted files, and what includes their headers."""
+    """The emitted files, and a file that includes their headers, compile as C and as C++, as for Arduino sketches."""
     needs_avr()
     hystgen.emit(model(name), tmp_path, operator="both", arithmetic=arithmetic, engine=engine, layout=layout)
     (tmp_path / "user.c").write_text(f'#include "{name}.h"\n#include "{name}_selftest.h"\n')
@@ -341,7 +341,7 @@ def test_compiles_for_the_avr_in_every_dialect(
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_the_self_test_passes_on_the_avr_as_cpp(arithmetic: str, tmp_path: Path) -> None:
-    """The bits of the oldest dialect, in which whole numbers beyond `long` have other types."""
+    """In gnu++98, the oldest dialect, integers wider than `long` have other types."""
     needs_avr()
     options = emit_options(model("mixed"), "both", arithmetic, "corners")
     written = sources.write(tmp_path, model("mixed"), options)
@@ -357,7 +357,7 @@ def test_the_self_test_passes_on_the_avr_as_cpp(arithmetic: str, tmp_path: Path)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "listed", "bent", "curved", "mixed"])
 def test_constants_count_as_ram_on_the_avr(name: str, arithmetic: str, engine: str) -> None:
-    """As measured, and as the banner says, which knows nothing of tables that a compiler folds."""
+    """RAM is measured and stated in the banner, which does not know of tables that a compiler folds."""
     needs_avr()
     options: dict[str, Any] = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
     report = hystgen.verify(model(name), targets=[targets.AVR.name], **options)
@@ -380,7 +380,7 @@ def of_many_plays(n: int) -> Model:
 
 
 def test_a_model_too_large_for_the_avr_says_how_many_plays_fit() -> None:
-    """Not a linker's address: the number that it gives does fit, and a few plays more do not."""
+    """The message is not a linker's: the number of plays that it gives fits, and a few plays more do not."""
     needs_avr()
     board = targets.AVR.name
     (row,) = hystgen.verify(of_many_plays(900), targets=[board]).rows
@@ -401,7 +401,7 @@ def test_a_model_too_large_for_the_avr_says_how_many_plays_fit() -> None:
 @pytest.mark.parametrize("operator", ["both", "inverse"])
 @pytest.mark.parametrize("arithmetic", ["float64", "q31"])
 def test_the_self_test_keeps_its_instance_off_the_stack(arithmetic: str, operator: str, tmp_path: Path) -> None:
-    """However many plays it has: 4352 bytes lay there once with 128 of them."""
+    """The stack does not depend on the number of plays; it once held 4352 bytes with 128 of them."""
     gcc = next(compiler for compiler in compilers.available() if compiler.name == "gcc")
     hystgen.emit(of_many_plays(128), tmp_path, operator=operator, arithmetic=arithmetic)
     gcc.run(["-O2", "-fstack-usage", "-c", "-o", tmp_path / "one.o", tmp_path / "many_selftest.c"])
@@ -519,7 +519,7 @@ unsigned int naked_forward_status(naked_forward_t *self);
 
 @pytest.mark.parametrize("target", targets.TARGETS, ids=CORES)
 def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_path: Path) -> None:
-    """Neither more nor less, and only where the harness calls step: not in a reset."""
+    """Exactly four are counted, and only where the harness calls step, not inside a reset."""
     (tmp_path / "naked.h").write_text(NAKED_HEADER)
     (tmp_path / "naked.c").write_text(
         STEP_OF_FOUR.replace("RETURN", '"bx lr"' if target.architecture == "arm" else '"ret"')
@@ -534,7 +534,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
     call = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT, slots.OP_STEP] * 5, dtype=np.uint8)
     core.run("naked", "forward", call, np.zeros(20, dtype=np.float32))
     assert core.counts.tolist() == [4] * 10
-    assert 0 < core.stack <= 16  # the reset's, which calls a step that needs none
+    assert 0 < core.stack <= 16  # stack of the reset, which calls a step that needs none
 
 
 def test_counts_are_the_same_in_two_runs() -> None:
@@ -567,9 +567,9 @@ def test_counts_agree_with_those_known_for_the_textbook_loop(
 
 
 def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
-    """By formula (35): so many different groups of plays, each with the drive at which it was left."""
+    """By formula (35), there are as many different groups of plays, each with the drive at which it was left."""
     found = []
-    for points in list(bench.corner_lists(16))[::2]:  # each also upside down
+    for points in list(bench.corner_lists(16))[::2]:  # the others are the same upside down
         r = np.asarray(bench.model(16).cascade.pi.thresholds)[1:]
         plays = np.full(16, points[0])
         for x in points:
@@ -598,10 +598,10 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
 def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
     core: str, n: int, arithmetic: str, operator: str, bench: ModuleType, tmp_path: Path
 ) -> None:
-    """Neither the benchmark's multisine nor jumps and steps at random."""
+    """Neither the benchmark's multisine nor random jumps and steps cost more."""
     made, case = bench.Bench(tmp_path), bench.Case(targets.find(core), "zig", n, operator, arithmetic)
     worst = made.worst(case)[0].max
-    if core == "cortex-m4f":  # the operations of the banner: between 4 and 22 instructions each, loads and branches too
+    if core == "cortex-m4f":  # each operation of the banner takes 4 to 22 instructions, loads and branches too
         words = cost.worst_case(n, operator, True, case.model.tables(arithmetic, "corners"))
         operations = sum(int(number) for number in re.findall(r"(\d+) (?:multiplications|comparisons)", words))
         assert 4 * operations <= worst <= 22 * operations, (words, worst)
@@ -617,7 +617,7 @@ def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
 def test_round_numbers_are_no_dearer_than_what_was_asked_for(
     step: float, low: int, bench: ModuleType, tmp_path: Path
 ) -> None:
-    """Records of `verify` turn right where plays start to follow; with round thresholds that is where moves end too."""
+    """Records of `verify` turn exactly where plays start to follow; with round thresholds, moves end there too."""
     thresholds = step * np.arange(17)
     weights = [0.7, *(0.15 * np.exp(-thresholds[1:] / 5)).tolist()]
     (tmp_path / "round.yaml").write_text(
@@ -636,10 +636,10 @@ def test_round_numbers_are_no_dearer_than_what_was_asked_for(
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("n", [16, 128])
 def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> None:
-    """A range from 0 on, as piezo drives have: once it has been up, references below what the plays leave at 0 get 0.
+    """In a range from 0 on, as of piezo drives, references below the output that plays keep at 0 get a drive of 0.
 
-    Being held there is cheap; leaving it makes one move; and what it takes to know that it is met is part of the
-    constructed worst case.
+    Being held there is cheap, leaving takes one move, and detecting the limit is part of the constructed worst
+    case.
     """
     case = bench.Case(targets.find("cortex-m4f"), "zig", n, "inverse", "float32", bench.RANGE)
     one_sided, made = bench.model(n, bench.RANGE), bench.Bench(tmp_path)
@@ -664,9 +664,9 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
     ],
 )
 def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, engine: str) -> None:
-    """RAM to the byte; code, which was measured for another model of the kind with as many plays, to a fifth.
+    """RAM is exact; code, measured for another model of the kind with as many plays, is right to a fifth.
 
-    With another number of plays a compiler may take all of them at once, or no longer.
+    With another number of plays, a compiler may start or stop unrolling them.
     """
     one = with_plays(name, 10)
     options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
@@ -698,9 +698,9 @@ def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, e
     ],
 )
 def test_the_dearest_sample_in_the_header_is_about_what_a_core_takes(name: str, engine: str, arithmetic: str) -> None:
-    """The banner adds up what each part takes at its dearest, measured with six states of creep, for instance.
+    """The banner adds up the cost of each part at its dearest, measured with six states of creep, for instance.
 
-    Its stack is the largest of such parts alone; together they take up to 80 bytes more or less.
+    Its stack is the largest of single parts; together they take up to 80 bytes more or less.
     """
     one = model(name)
     options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
@@ -761,7 +761,7 @@ def test_firmware_that_faults_or_hangs_is_a_failure(changed_c: Callable[..., Non
 
 
 def test_an_emulator_that_runs_nothing_is_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Though it exits with 0."""
+    """An emulator that exits with 0 and prints no result has failed."""
     idle = tmp_path / firmware.QEMU
     idle.write_text("#!/bin/sh\nexit 0\n")
     idle.chmod(0o755)

@@ -23,7 +23,7 @@ Y = np.round(0.3 * V + 1.5, 5)
 
 
 def table(join: str = ",", time: float = 1.0, digits: str = ".5f", columns: int = 3) -> list[str]:
-    """Rows of t, v, y; of v, y alone; of t, v, y and a row number."""
+    """Rows of t, v, y; of v, y; or of t, v, y and a row number."""
     picked = {2: (V, Y), 3: (T * time, V, Y), 4: (T * time, V, Y, np.arange(N, dtype=float))}[columns]
     return [join.join(f"{x:{digits}}" for x in row) for row in zip(*picked, strict=True)]
 
@@ -60,7 +60,7 @@ def aligned() -> list[str]:
     ("join", "units", "decimal_commas"), [(",", True, False), (";", False, True), ("\t", True, True)]
 )
 def test_a_header_longer_than_what_is_looked_at(tmp_path: Path, join: str, units: bool, decimal_commas: bool) -> None:
-    """Of 15000 columns the header alone has more than 64 Ki characters; what follows shows units and decimals."""
+    """The header of 15 000 columns alone exceeds 64 Ki characters; the lines after it show units and decimals."""
     more = 15_000
     head = ["t", "v", "y", *(f"c{k}" for k in range(more))]
     rows = [row + (join + "1.5") * more for row in table(join)]
@@ -150,7 +150,7 @@ def test_columns_by_their_numbers(tmp_path: Path) -> None:
     check(read_record(three, parse_columns("t=1,v=2,y=3")))
     check(read_record(two, parse_columns("1,2"), sample_time=0.0005))
     assert np.array_equal(read_record(three, parse_columns("1,3,2")).v, Y)
-    # A name comes before a number, a number with # is never a name of those
+    # A name takes precedence over a number; a number with # is never a name
     named = put(tmp_path / "n.csv", "t,2,3", *table())
     check(read_record(named, {"v": "2", "y": "3"}))
     check(read_record(named, parse_columns("1,2,3")))
@@ -177,7 +177,7 @@ def test_sample_rates_above_the_numbers(tmp_path: Path, line: str) -> None:
     check(record)
     assert record.sample_time == pytest.approx(0.0005)
     assert "(line 1" in record.read_as
-    # A time of its own, and the user, know better
+    # A time column, and the user's option, take precedence
     own = put(tmp_path / "b.csv", line.replace("2", "7").replace("5", "7"), "t,v,y", *table())
     check(read_record(own))
     assert read_record(tmp_path / "a.csv", sample_time=0.25).sample_time == 0.25
@@ -203,7 +203,7 @@ def test_decimal_commas_that_may_be_thousands_marks(tmp_path: Path) -> None:
     # One number that can only be a decimal decides for all
     record = read_record(put(tmp_path / "b.csv", "t;v;y", *rows, "60;0,5;1,000"))
     assert record.v[:2].tolist() == [1.1, 2.101]
-    # With a point behind it the comma is not a decimal comma, and nothing is read
+    # With a point after it, the comma is not a decimal comma, and the file is refused
     rows = [f'{k},"{1 + k % 9},{100 + k}.5",{k % 7}' for k in range(N)]
     (problem,) = problems(put(tmp_path / "c.csv", "t,v,y", *rows))
     assert ':2:3: error: "1,100.5" in column "v" is not a number; export numbers without thousands marks' in problem
@@ -247,7 +247,7 @@ def test_one_cause_one_message(tmp_path: Path) -> None:
      ("Elapsed Time (ms),driveVoltage,sensor_um", "tvy"), ("x [ms],v,y", "tvy"), ("v [V],v [mV],y", "y")],
 )  # fmt: skip
 def test_what_names_mean(tmp_path: Path, header: str, named: str) -> None:
-    """Columns are found by what their names mean only where one column alone may be meant."""
+    """Columns are found by the meaning of their names only if a single column may be meant."""
     path = put(tmp_path / "a.csv", header, *table())
     if named == "tvy":
         record = read_record(path)
@@ -266,7 +266,7 @@ def test_names_of_ours_come_before_meanings(tmp_path: Path) -> None:
     assert record.v.tolist() == list(range(N))
     assert list(record.extra) == ["drive"]
     check(read_record(tmp_path / "a.csv", {"v": "drive"}))
-    # Not needed, so not looked for
+    # y is not needed, so it is not looked for
     record = read_record(put(tmp_path / "b.csv", "t,v,position,k", *rows), need=("v",))
     assert record.y is None
     assert list(record.extra) == ["position", "k"]
@@ -343,7 +343,7 @@ def test_dates_that_may_be_read_in_two_ways(tmp_path: Path) -> None:
     lines = [f"0{4 + k // 30}/03/2024 {(23 + k // 30) % 24:02}:00:{k:02},{row}" for k, row in enumerate(rows)]
     (problem,) = problems(put(tmp_path / "a.csv", "time,v,y", *lines))
     assert "may begin with the day or with the month" in problem
-    # With a point the day comes first everywhere
+    # With points, the day comes first everywhere
     lines = [line.replace("/", ".") for line in lines]
     record = read_record(put(tmp_path / "b.csv", "time,v,y", *lines))
     assert record.t[30] == 3630.0
@@ -359,7 +359,7 @@ def test_a_broken_time_of_day_has_a_place(tmp_path: Path) -> None:
 
 
 def test_times_since_1970(tmp_path: Path) -> None:
-    """In seconds they need no unit; in milliseconds, microseconds or nanoseconds nothing else can be meant, or said."""
+    """Numbers this large cannot be seconds, so milliseconds, microseconds and nanoseconds need a written unit."""
     rows = table(columns=2)
 
     def stamps(name: str, factor: int) -> Path:
@@ -452,7 +452,7 @@ def styled(seed: int) -> tuple[str, np.ndarray[Any, Any]]:
 
 
 def test_tables_in_any_style_are_read_right_or_refused(tmp_path: Path) -> None:
-    """A wrong reading is worse than a refusal; and of those with a header next to none is refused."""
+    """A wrong reading is worse than a refusal; of the tables with a header, hardly any is refused."""
     read = refused = 0
     for seed in range(200):
         text, numbers = styled(seed)

@@ -1,4 +1,4 @@
-"""Records with fewer samples: what a model does at those that are left is what it does with all of them."""
+"""Thinned records: a model's output at the samples kept is what it is with all samples."""
 
 import itertools
 import math
@@ -28,7 +28,7 @@ WEIGHTS = np.array([0.5, 0.2, 0.2, 0.1])
 
 
 def drives() -> dict[str, Array]:
-    """Drives over about -5 to 5, of 8000 samples: slow, with holds and edges, quick, with small turns inside."""
+    """Drives of 8000 samples over about -5 to 5: slow, with holds and edges, fast, with small turns inside."""
     t = np.arange(8000) * DT
     staircase = np.repeat([0.0, 3.0, -2.0, 5.0, -5.0, 1.0, 4.0, 0.0], 1000)
     return {
@@ -46,25 +46,25 @@ def plays(w: Array) -> Array:
 
 
 def item(v: Array, left: Array, name: str = "made") -> Item:
-    """A record that a model of plays alone leaves `left` of."""
+    """A record in which a model of plays alone leaves the error `left`."""
     run = Run(np.arange(len(v)) * DT, v)
     return Item(name, run, plays(v) + left, (float(v[0]),), float(np.ptp(v)))
 
 
 def needed(v: Array, left: Array) -> NDArray[np.intp]:
-    """Places of the samples that are needed."""
+    """Indices of the samples that are needed."""
     (mask,) = needed_samples([item(v, left)], [left], NOISE)
     return np.flatnonzero(mask)
 
 
 def white(number: int) -> Array:
-    """Noise."""
+    """White noise of standard deviation `NOISE`."""
     return np.random.default_rng(3).normal(0.0, NOISE, number)
 
 
 @pytest.mark.parametrize("name", drives())
 def test_plays_at_the_needed_samples_are_those_of_all_samples(name: str) -> None:
-    """A turn that is passed over moves the drive that plays see by this amount, and none of them by more (their map is
+    """A skipped turn changes the drive that plays see by at most this amount, and each play by no more (its map is
     Lipschitz)."""
     v = drives()[name]
     at = needed(v, white(len(v)))
@@ -86,8 +86,8 @@ def test_plays_at_the_needed_samples_are_those_of_all_samples(name: str) -> None
     ids=lambda effect: f"{effect.name}",
 )
 def test_what_acts_on_the_drive_sees_the_drive_that_all_samples_are(name: str, effect: Effect) -> None:
-    """None of these makes more of a difference of the drive than it is, and plays make no more than their weights of
-    it; the drive is straight between the samples that are left, but for so much."""
+    """None of these effects magnifies a difference of the drive, and plays magnify it by their weights at most; between
+    the samples kept, the drive is straight to within the allowed error."""
     v = drives()[name]
     whole = Run(np.arange(len(v)) * DT, v)
     left = plays(np.asarray(effect.drive(v, whole))) - plays(v) + white(len(v))
@@ -100,7 +100,7 @@ def test_what_acts_on_the_drive_sees_the_drive_that_all_samples_are(name: str, e
 
 @pytest.mark.parametrize("name", drives())
 def test_a_filter_behind_the_plays_does_too(name: str) -> None:
-    """As far as the plays are straight: the filter's answer to the rest is no larger than it."""
+    """As far as plays are straight, the filter's response to the rest is no larger than the rest."""
     v = drives()[name]
     whole = Run(np.arange(len(v)) * DT, v)
     follow = Lag(name="lag", time_constant=0.02)
@@ -113,7 +113,7 @@ def test_a_filter_behind_the_plays_does_too(name: str) -> None:
 
 
 def test_what_rings_is_seen_in_what_is_left_alone() -> None:
-    """Behind each edge something rings, and neither the drive nor the plays show it."""
+    """After each edge something rings, which neither the drive nor the plays show."""
     v = drives()["staircase"]
     since, at = np.arange(len(v)) % 1000, np.arange(len(v))
     left = 0.1 * np.exp(-since / 100.0) * np.sin(2 * np.pi * since / 11.0) + white(len(v))
@@ -146,7 +146,7 @@ class TestThinned:
     USED = ("sine", "staircase", "triangle")
 
     def groups(self) -> tuple[list[list[Item]], list[list[NDArray[np.bool_]]]]:
-        """Two records to fit and a held-out one between them, of one session, and what is needed of them."""
+        """Two records to fit and a held-out one between them, of one session, and masks of the samples needed."""
         made = [item(v, white(len(v)), name) for name, v in drives().items() if name in self.USED]
         starts = (0.0, 20.0, 40.0)
         runs = [Run(each.run.t + start, each.run.v) for each, start in zip(made, starts, strict=True)]
@@ -195,7 +195,7 @@ class TestThinned:
         assert thinned(groups, 100_000, masks) == groups
 
     def test_what_adds_up_does_over_all_samples(self) -> None:
-        """Even where the drive's own noise is passed over."""
+        """Ways and heats are exact even where noise of the drive is skipped."""
         rng = np.random.default_rng(8)
         v = drives()["sine"] + rng.normal(0.0, 1e-5, 8000)
         whole = Run(np.arange(8000) * DT, v)

@@ -1,4 +1,4 @@
-"""What each compensator would leave on a recorded actuator."""
+"""Errors that each compensator would leave on a recorded actuator."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ model:
 
 
 def recorded(noise: float = 1e-3) -> Record:
-    """Stops instead of plays, and springs with dampers stepped ten times per sample: none of the package's code."""
+    """A record of stops instead of plays, and of springs with dampers, stepped ten times per sample here."""
     rng = np.random.default_rng(4)
     turns = np.concatenate([[0.0, 100.0, 0.0], rng.uniform(0.0, 100.0, 40)])
     v = np.interp(np.linspace(0, len(turns) - 1, 4000), np.arange(len(turns)), turns)
@@ -63,7 +63,7 @@ def test_the_whole_model_leaves_the_noise_and_plays_alone_the_creep() -> None:
 
 
 def solved(y: float, states: list[float]) -> float:
-    """The drive in range at which the plays of `TEXT` alone give y or are nearest to it, by bisection."""
+    """The drive in range at which the plays of `TEXT` alone give y, or come nearest to it, by bisection."""
     r, p = (0.0, 4.0, 10.0, 20.0, 35.0), (0.15, 0.02, 0.02, 0.02, 0.01)
     low, high = 0.0, 100.0
     for _ in range(80):
@@ -75,7 +75,7 @@ def solved(y: float, states: list[float]) -> float:
 
 
 def test_plays_alone_are_the_plays_of_the_model() -> None:
-    """Not others that were fitted to the record that is tracked: here it creeps far more than the model says."""
+    """Plays are not refitted to the record that is tracked, which creeps far more here than the model says."""
     record = recorded()
     assert record.y is not None
     other = Record("other.csv", record.t, record.v, record.y + 0.05 * np.cumsum(record.v - 50.0) * T)
@@ -99,7 +99,7 @@ def test_a_model_without_effects_is_its_plays() -> None:
 
 
 class TestLimited:
-    """Drives that an end of the range really changed, counted beside a model whose range is wide."""
+    """Only drives that an end of the range really changed are counted."""
 
     STATIC = TEXT.partition("  effects")[0]
     LAGS = TEXT + "    - {name: lag, time_constant: 0.02}\n"
@@ -134,7 +134,7 @@ class TestLimited:
         assert self.said(self.STATIC, u)[0] == "u.csv: 1 of 93 references lies outside the output range and was limited"
 
     def test_a_little_beyond_the_range_counts(self) -> None:
-        """A millionth of the range, a code of a converter of 20 bits."""
+        """The excess is a millionth of the range, a code of a 20-bit converter."""
         for text in (self.STATIC, TEXT):
             model = Model(parse_parameters(text))
             wide = Model(parse_parameters(text.replace("[0, 100]", "[-10, 110]")))
@@ -173,7 +173,7 @@ def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple
 
 
 def test_what_rounds_corners_or_makes_late_counts_as_error() -> None:
-    """Creep is taken back exactly, so that the motion is the reference as it was averaged and delayed."""
+    """Creep is compensated exactly, so the motion is the averaged and delayed reference."""
     record = recorded(0.0)
     model = Model(parse_parameters(TEXT + "emit: {compensation: {corner: 21, preview: 10}}\n"))
     (one,) = tracking.track(model, [record]).records

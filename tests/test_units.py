@@ -296,7 +296,7 @@ def test_diagnose_converts_and_gives_a_model_without_units_those_of_the_records(
 
 
 def test_a_recorded_session_is_cut_in_the_models_units(tmp_path: Path, run: Run) -> None:
-    """Refused for its drive before any search: in mV it fits the session once it is converted."""
+    """The recording in mV fits the session once converted, and is refused before any search as it ends too early."""
     (tmp_path / "session.json").write_text(
         '{"hystgen": 1, "rate": 100.0, "samples": 20000, "history": [100.0, 0.0], "rest": 0.0, "rise": 0.25, '
         '"dac": null, "records": [{"name": "a.csv", "first": 0, "samples": 9999, "held_out": false}]}'

@@ -1,4 +1,4 @@
-"""Verification finds what it is there to find."""
+"""Verification finds the faults that it is meant to find."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def model(name: str) -> Model:
 
 @pytest.fixture
 def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[str], str]], None]:
-    """Lets a test change the emitted `NAME.c` before it is compiled."""
+    """Let a test change the emitted `NAME.c` before it is compiled."""
     emitted = module.files
 
     def change(how: Callable[[str], str]) -> None:
@@ -63,7 +63,7 @@ def test_contraction_is_found_under_the_default_flags(compiler: str, changed_c: 
 
 @pytest.mark.parametrize("digit", ["0.4", "0.0119"])
 def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., None]) -> None:
-    """One unit in the last place of one number suffices."""
+    """A change of one number by one unit in the last place is enough."""
 
     def change(text: str) -> str:
         numbers = re.findall(r"(?<![\w.])\d+\.\d+(?:e[+-]?\d+)?f", text)
@@ -80,7 +80,7 @@ def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., N
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("curve", ["front", "back"])
 def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c: Callable[..., None]) -> None:
-    """Beside a break of a dead zone a piece of a curve is one code long, which no random record comes to."""
+    """Next to a break of a dead zone, a piece of a curve is one code long, which no random record reaches."""
     bent = model("bent")
     numbers = bent.tables("q31", "corners")
     assert isinstance(numbers, FixedTables)
@@ -128,7 +128,7 @@ def test_a_compiler_that_is_asked_for_and_missing_is_a_failure(monkeypatch: pyte
 
 
 def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Distributors set CC='ccache gcc'; the first word is what has to be there."""
+    """Distributors set CC='ccache gcc'; only the first word has to be installed."""
     launcher = tmp_path / "ccache"
     launcher.write_text(f'#!/bin/sh\necho "$@" >> "{tmp_path}/calls"\nexec "$@"\n')
     launcher.chmod(0o755)
@@ -176,7 +176,7 @@ def test_compilers_keep_their_temporary_files_where_the_output_goes(tmp_path: Pa
 def test_where_temporary_files_may_not_be_executed_a_library_is_loaded_from_elsewhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As with a TMPDIR that is mounted noexec: there the loader fails with these words."""
+    """In a TMPDIR that is mounted noexec, the loader fails with these words."""
     blocked, free = tmp_path / "tmp", tmp_path / "run"
     blocked.mkdir()
     free.mkdir()
@@ -252,7 +252,7 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
     levels = numbers.start_level if inverse else numbers.threshold
     moves = np.abs(np.diff(onto.astype(float)))
     known = np.min(np.abs(moves[:, None] - 2.0 * levels.astype(float)), axis=1) < 1e-5 * (high - low)
-    assert np.mean(known) > 0.9  # over again, by last bits, or just as far as a play needs
+    assert np.mean(known) > 0.9  # repeated, changed in the last bits, or moved just as far as a play needs
     assert np.mean(moves == 0) > 0.2
     assert np.mean(moves > 0.01 * (high - low)) > 0.2
     odd = records["NaN, infinities, extremes"][1]

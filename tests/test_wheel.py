@@ -1,4 +1,4 @@
-"""What is published: the source archive and the wheel, the latter also installed in an environment of its own."""
+"""The published files: the source archive, and the wheel, which is also installed in an environment of its own."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from hystgen.verification import compilers
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
-# Nothing of the surroundings but what the tools need
+# Without variables that would let the tools find other packages
 OUTSIDE = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
 OUTSIDE["PYTHONNOUSERSITE"] = "1"
 
 
 def run(*command: object, folder: Path, code: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run a program in `folder`; it exits with `code`."""
+    """Run a program in `folder` and check that it exits with `code`."""
     done = subprocess.run(
         list(map(str, command)), cwd=folder, env=OUTSIDE, capture_output=True, text=True, check=False
     )
@@ -45,7 +45,7 @@ def run(*command: object, folder: Path, code: int = 0) -> subprocess.CompletedPr
 
 @pytest.fixture(scope="module")
 def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Source archive and the wheel built from it, in isolation: what pyproject.toml asks for has to suffice."""
+    """Source archive and the wheel built from it in isolation, so what pyproject.toml asks for has to suffice."""
     folder = tmp_path_factory.mktemp("dist")
     run(sys.executable, "-m", "build", "--outdir", folder, ROOT, folder=folder)
     return folder

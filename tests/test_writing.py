@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all, and what is left of those that did not get that far."""
+"""Files are written completely or not at all, and leftovers of interrupted writes are removed."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from hystgen.basics import writing
 
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a process that has looked through no folder yet."""
+    """Start each test as in a process that has not swept any folder yet."""
     monkeypatch.setattr(writing, "_swept", set())
 
 
 def holder(around: Path) -> subprocess.Popen[str]:
-    """Another process with a staging folder in `around`, which says when it has it."""
+    """Another process that holds a staging folder in `around`; it is returned once the folder exists."""
     code = (
         "import sys, time; from pathlib import Path; from hystgen.basics import writing\n"
         "with writing.staging(Path(sys.argv[1])) as folder:\n"
@@ -88,7 +88,7 @@ def test_what_others_named_alike_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_many_processes_at_once_in_one_folder(tmp_path: Path) -> None:
-    """Each makes folders, looks for stale ones and is killed at some time: nobody loses a folder that it holds."""
+    """Processes make folders and sweep stale ones, and two are killed; none loses a folder that it holds."""
     code = (
         "import sys; from pathlib import Path; from hystgen.basics import writing\n"
         "for k in range(200):\n"
@@ -117,7 +117,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
     (tmp_path / ".hystgen-old" / "files").mkdir(parents=True)
     monkeypatch.setattr(fcntl, "flock", refuse)
     writing.write_atomically(tmp_path / "a.txt", "a")
-    # It may be in use: without locks nobody knows
+    # It may be in use, which cannot be known without locks
     assert sorted(os.listdir(tmp_path)) == [".hystgen-old", "a.txt"]
 
 

@@ -1,6 +1,6 @@
-"""What a test of the numbers in `hystgen.diagnosis.search.acceptance` needs: the rows of its table, and their texts.
+"""Helpers for testing the numbers in `hystgen.diagnosis.search.acceptance`: the rows of its table, and their texts.
 
-A row names the numbers that decide it and lists, for a case just on either side of each, what its function answers.
+A row names the numbers that decide it and lists the answers of its function in cases just on either side of each.
 `tests/test_acceptance.py` holds the rows; `docs/thresholds.csv` lists them by number.
 """
 
@@ -27,7 +27,7 @@ HEAD = ("number", "value", "unit", "decides")
 
 @dataclass(frozen=True)
 class Row:
-    """A function, its answer in each case, and the numbers whose double and half change an answer."""
+    """A function, its answer in each case, and the numbers that change an answer when doubled or halved."""
 
     name: str
     numbers: tuple[str, ...]
@@ -52,7 +52,7 @@ ROWS: list[Row] = []
 
 
 def row(name: str, numbers: str, cases: Mapping[Any, Any], function: Callable[..., Any]) -> None:
-    """Add a row; `cases`: the answer by what the function is given, one argument or a tuple of them."""
+    """Add a row; `cases` maps the argument of the function, or a tuple of arguments, to its answer."""
     listed = ((key if isinstance(key, tuple) else (key,), answer) for key, answer in cases.items())
     ROWS.append(Row(name, tuple(numbers.split()), tuple(listed), function))
 
@@ -84,12 +84,12 @@ def also(test: Callable[..., None], numbers: str) -> None:
 
 
 def rows(number: str) -> list[Row]:
-    """Those that a number decides."""
+    """Rows that a number decides."""
     return [each for each in ROWS if number in each.numbers]
 
 
 def names() -> list[str]:
-    """All numbers, in their order."""
+    """Names of all numbers, in their order."""
     found = vars(acceptance).items()
     return [name for name, value in found if name.isupper() and isinstance(value, int | float | tuple)]
 
@@ -102,7 +102,7 @@ def changed(value: Any, factor: float) -> Any:
 
 
 def texts() -> Iterator[tuple[list[str], str]]:
-    """Numbers that are assigned together, and the text below them."""
+    """Names of numbers that are assigned together, and the text below them."""
     for each, text in itertools.pairwise(ast.parse(Path(acceptance.__file__).read_text(encoding="utf-8")).body):
         if isinstance(each, ast.Assign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
             targets = [name.id for name in ast.walk(each.targets[0]) if isinstance(name, ast.Name)]
@@ -110,7 +110,7 @@ def texts() -> Iterator[tuple[list[str], str]]:
 
 
 def unit(name: str) -> str:
-    """The unit that stands before the text below a number; of several numbers with a text in common its own."""
+    """The unit at the start of the text below a number; if several numbers share the text, that of this one."""
     together, text = next(each for each in texts() if name in each[0])
     units = [part.partition("]")[0].removeprefix("[") for part in text.split(", [")]
     return units[together.index(name) if len(units) == len(together) else 0]

@@ -1,6 +1,6 @@
-"""The files of `c_runtime/` and of effects as they stand, in one unit with the numbers of a model.
+"""The C files of `c_runtime/` and of effects as they are, in one unit with the numbers of a model.
 
-Nothing is renamed or picked but what conditions on the model choose; files for either operator stand there for each.
+Nothing is renamed, and only conditions on the model select code; files for either operator appear once for each.
 
 The model is called `hystgen`, so that its macros and tables have the names that the files use.
 """
@@ -21,7 +21,7 @@ from hystgen.parameters.files import parse_parameters
 RUNTIME = runtime.data_folder("c_runtime")
 EFFECTS = runtime.data_folder("hystgen") / "effects"
 INCLUDES = [f"-I{RUNTIME}", f"-I{EFFECTS.parent}"]
-"""Where files look for each other."""
+"""Folders in which files look for each other."""
 
 DEFINES = {
     "float32": [],
@@ -29,10 +29,10 @@ DEFINES = {
     "q31": ["-DHYSTGEN_FIXED"],
     "q15": ["-DHYSTGEN_FIXED", "-DHYSTGEN_REAL_IS_SHORT"],
 }
-"""What `hystgen_runtime.h` asks a build for."""
+"""Macros that `hystgen_runtime.h` expects from a build."""
 
 FLAGS = ["-ffp-contract=off", "-Wno-unused-function", "-Wno-unused-parameter"]
-"""A file has functions and parameters for every model; emission leaves out those that one model has no use for."""
+"""A file has functions and parameters for every model; emission leaves out those that a model does not use."""
 
 ANALYSED = (
     ("two_branches", "q15", "loop"),
@@ -89,7 +89,7 @@ UNITS = (
     ("steady", "float32", "loop"),
     ("steady", "q15", "loop"),
 )
-"""Every effect by itself too, in floating point and in fixed point."""
+"""Also every effect by itself, in floating point and in fixed point."""
 
 
 def model(name: str) -> Model:
@@ -135,7 +135,7 @@ def _states(one: EmittedModel) -> list[str]:
 
 
 def _blocks(one: EmittedModel) -> list[str]:
-    """The files of blocks, without those of a preview, a delay, a quiet drive and two branches where there are none."""
+    """The files of blocks, without those of a preview, a delay, a quiet drive and two branches that the model lacks."""
     if not one.compiled:
         return []
     t = one.compiled.tables
@@ -148,7 +148,7 @@ def _blocks(one: EmittedModel) -> list[str]:
 
 
 def _included(file: str, facts: frozenset[str]) -> list[str]:
-    """What puts a file into a unit: one for either operator as emission has it for each."""
+    """Lines that put a file into a unit; a file for either operator appears in the form of each, as in emission."""
     text = ((EFFECTS.parent if file.startswith("effects/") else RUNTIME) / file).read_text(encoding="utf-8")
     forms = runtime.forms(text, facts)
     if len(forms) == 1:

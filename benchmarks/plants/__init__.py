@@ -14,11 +14,11 @@ run, score                the package's command line on every case; the figures 
 `generate --drives PLAN --holdout FILE ..` drives the plants with records from elsewhere, such as those that
 `hystgen diagnose --plan` writes; `--kind single --seeds 0:13` then hides every effect once.
 
-An effect counts as visible from three times the noise, by the rms that it leaves by itself when a fine play sum and an
-offset per record are refitted to the noise-free records. Held-out records are never fitted, so that an effect that only
-they show cannot be found: at least half of its strength is wanted in the held-out records and, after a refit to only
-the records to fit, in those. If five draws do not achieve that (as with a slew limit that only the edges of one
-held-out staircase reach), the nearest is kept, and an effect that leaves less than half of three times the noise in the
-records to fit counts as not visible. A name whose error on the held-out records is at most 5 % larger than that of the
-plant's true form is indistinguishable there; for a pair this is decided for each effect by itself.
+An effect counts as visible if it leaves, by itself, an rms of at least three times the noise when a fine play sum and
+an offset per record are refitted to the noise-free records. Held-out records are never fitted, so an effect that only
+they show cannot be found: the held-out records and, after a refit to only these, the records to fit each have to show
+half of its strength. If five draws do not achieve that (as with a slew limit that only the edges of one held-out
+staircase reach), the nearest is kept, and an effect that leaves less than half of three times the noise in the records
+to fit counts as not visible. A name whose error on the held-out records is at most 5 % larger than that of the plant's
+true form is indistinguishable there; for a pair this is decided for each effect by itself.
 """

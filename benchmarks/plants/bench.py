@@ -13,7 +13,7 @@ KINDS = ("static", "dynamic", "mixed")
 
 @dataclass(frozen=True)
 class Bench:
-    """`rates` [1/s] of slow and fast records, equal on a bench of one kind; `samples` per record."""
+    """`rates` [1/s] of slow and fast records, equal unless the bench is mixed; `samples` per record."""
 
     kind: str
     low: float

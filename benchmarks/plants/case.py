@@ -1,6 +1,6 @@
 """The case of a seed: bench, session, plant, noise, the nominal model, and the strength of its effects.
 
-Seeds below REPORT are for tuning, those from it on for reporting; nothing else separates the two blocks.
+Seeds below REPORT are for tuning, the others for reporting; nothing else separates the two blocks.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class Case:
         return "case_" + hashlib.sha256(f"{self.kind}:{self.seed}".encode()).hexdigest()[:10]
 
     def noise(self, held_out: bool | None = None) -> float:
-        """Rms of the converters' error [output], over all records or those held out or not; without any fault."""
+        """Rms error of the converters [output] without any fault: of the held-out records, of the others, or of all."""
         rows = [k for k, r in enumerate(self.session.records) if held_out is None or r.held_out == held_out]
         return float(np.sqrt(np.mean(np.concatenate([self.added[k] for k in rows]) ** 2)))
 
@@ -322,7 +322,7 @@ def _nominal(rng: np.random.Generator, course: refit.Track, output: Array, span:
     weights = np.maximum(weights, 0.0)
     thresholds = thresholds * rng.uniform(0.97, 1.03)
     offset = float(np.mean(output) - np.mean(columns @ weights))
-    # As written, two thresholds may be the same
+    # Rounded for the file, two thresholds may be equal
     written, first = np.unique([float(f"{x:.5g}") for x in thresholds], return_index=True)
     weights = np.add.reduceat(weights, first)
     return Nominal(tuple(written.tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}"))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Drive = Callable[[np.random.Generator, Array, float, float], Array]
-"""Function of a random generator, the time in the record from 0 to 1, the start value, and one sample's share of it."""
+"""Function of a random generator, the time in the record from 0 to 1, the start value, and a sample's share of the
+time."""
 
 
 def path(t: Array, sample: float, points: list[tuple[float, float]]) -> Array:

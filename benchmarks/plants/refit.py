@@ -83,7 +83,7 @@ def centred(columns: Array, record: Ints) -> Array:
 
 
 def fit(columns: Array, y: Array, free: int = 0) -> Array:
-    """Weights, not negative except for the last `free`; columns (N, n) and y (N,) have no mean."""
+    """Least-squares weights, non-negative except for the last `free`; columns (N, n) and y (N,) must have zero mean."""
     rms = np.sqrt(np.mean(columns * columns, axis=0))
     scale = np.where(rms > STILL * np.max(rms), rms, np.inf)
     scaled = columns / scale
@@ -100,8 +100,8 @@ def fit(columns: Array, y: Array, free: int = 0) -> Array:
 
 @dataclass(frozen=True)
 class Left:
-    """Rms that is left of a noise-free output: over all records and over the held-out ones after a joint refit to all,
-    and over the records to fit after a refit to only these."""
+    """Rms residual of a noise-free output: over all records and over the held-out ones after a joint refit to all, and
+    over the records to fit after a refit to only these."""
 
     everywhere: float
     held_out: float

@@ -97,7 +97,7 @@ def _best(data: Data, rival: Rival) -> float:
     reach = 2.0 if rival.positive else 0.5
 
     def point(x: Array) -> Array:
-        # a direction without effect must not lead to infinity
+        # a parameter without effect must not run off to infinity
         x = np.clip(x, begins.min(axis=0) - reach, begins.max(axis=0) + reach)
         return np.exp(x) if rival.positive else x
 
@@ -137,7 +137,7 @@ def _lag(data: Data, x: Array) -> Array:
 def _delayed(straight: bool) -> Form:
     """Delays the plays instead of the drive: they remember corners, which a drive delayed by a part of a sample misses.
 
-    Between samples, straight lines are right beside steep edges, and Akima's curves on sines.
+    Between samples, straight lines suit steep edges, and Akima's curves suit sines.
     """
 
     def form(data: Data, x: Array) -> Columns:

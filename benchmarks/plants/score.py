@@ -1,8 +1,8 @@
 """Count how often the diagnosis was right, by labels that it has not seen.
 
-A name counts as right when it is the effect's, or one that the label holds indistinguishable on the given records and
-that the diagnosis reports as not separable from the effect's own. A pair of names that are separable by the label is
-no excuse for the wrong one.
+A name counts as right if it is the effect's, or if the label calls it indistinguishable on the given records and the
+diagnosis reports it as not separable from the effect's own. Reporting two names as not separable does not excuse the
+wrong one if the label says that they are separable.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Outcome:
 
     @property
     def refused(self) -> bool:
-        """A record was refused as bad input, by its name; a wrong command line also exits 2."""
+        """A record was refused as bad input and named; exit code 2 alone could also mean a wrong command line."""
         said = re.search(r"\.csv\b.*: error: |error: .*\.csv: ", self.run.get("stderr", ""))
         return self.run.get("exit") == 2 and said is not None
 

@@ -195,5 +195,5 @@ def _room(rng: np.random.Generator, t: Array) -> Array:
 
 
 def _round(x: float) -> float:
-    """Two significant digits, as a user would write down."""
+    """Two significant digits, as a user would write it down."""
     return float(f"{x:.2g}")

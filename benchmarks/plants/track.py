@@ -158,7 +158,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         outputs = np.concatenate([columns["y"] for columns in case.measured])
         drives = np.concatenate([columns["v"] for columns in case.measured])
         stand = case.session.bench
-        # a straight line at the ends of the drive: a ringing stage goes further, and no drive can hold it
+        # a line fit at the ends of the drive: a ringing stage goes further, but no drive can hold it there
         low, high = np.polyval(np.polyfit(drives, outputs, 1), [stand.low, stand.high]).tolist()
         low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
         u = reference(np.random.default_rng(seed), low, high)
@@ -170,7 +170,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         for name in ("plain", "whole"):
             with (home / f"{name}.yaml").open("a") as file:
                 file.write(f"sample_time: {1.0 / rate!r}\n")
-                heated = "thermal" in names  # which may be the drive's own heat
+                heated = "thermal" in names  # which may mean self-heating by the drive
                 if name == "whole":  # references here have no noise
                     asked = ", compensate: [self_heating]" * heated
                     file.write(f"emit:\n  compensation: {{noise_gain: 1.0e+9{asked}}}\n")

@@ -17,7 +17,7 @@ from hystgen.plays import operators
 
 
 def make(folder: Path) -> None:
-    """Draw the figures into the folder. Raises MismatchError."""
+    """Write the figures to the folder. Raises MismatchError."""
     _numbers()
     with drawing.styled():
         _dead_zones(folder)
@@ -31,7 +31,7 @@ def make(folder: Path) -> None:
 def _numbers() -> None:
     """Numbers that the note prints for Examples 4 and 6."""
     found = note.PI_4.inverse()
-    # The note's z_5 = 4.386 is one off in its last digit
+    # The last digit of the note's z_5 = 4.386 is one too high
     note.check("Example 4, z_i (36)", found.thresholds, "0 0.293 0.877 1.755 2.924 4.385 6.139")
     note.check("Example 4, z_5 to three digits", found.thresholds[5], "4.39")
     note.check("Example 4, q_i (37)", found.weights, "1.5385 -0.7691 -0.2564 -0.1282 -0.0769 -0.0513 -0.0366")

@@ -14,7 +14,7 @@ from hystgen.basics import drawing
 
 
 def make(folder: Path) -> None:
-    """Draw the figures into the folder. Raises MismatchError."""
+    """Write the figures to the folder. Raises MismatchError."""
     with drawing.styled():
         _inverse(folder)
         _exact(folder)

@@ -14,7 +14,7 @@ from hystgen.plays import density, operators
 
 
 def make(folder: Path) -> None:
-    """Draw the figures into the folder. Raises MismatchError."""
+    """Write the figures to the folder. Raises MismatchError."""
     with drawing.styled():
         _any_input(folder)
         _width_and_slopes(folder)
@@ -48,7 +48,7 @@ def _full_loop(model: PI, v_max: float) -> tuple[note.Array, note.Array]:
 
 
 def _draw_width(axes: Any, model: PI, v_max: float) -> None:
-    """The loop, and the distance between its rising and falling halves where the output is zero."""
+    """Draw the loop, and the distance between its rising and falling halves where the output is zero."""
     v, y = _full_loop(model, v_max)
     right, left = float(np.interp(0.0, y[:2001], v[:2001])), float(np.interp(0.0, y[:2000:-1], v[:2000:-1]))
     # both crossings shift by the output error divided by the slope there

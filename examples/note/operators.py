@@ -12,7 +12,7 @@ from hystgen.plays import elastoplastic, operators
 
 
 def make(folder: Path) -> None:
-    """Draw the figures into the folder. Raises MismatchError."""
+    """Write the figures to the folder. Raises MismatchError."""
     with drawing.styled():
         _characteristics(folder)
         _masses(folder)

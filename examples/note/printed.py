@@ -50,7 +50,7 @@ def sine(amplitude: float, frequency: float = 1.0) -> Array:
 def check(what: str, values: ArrayLike, printed: str, off: ArrayLike = 0.0) -> None:
     """Raise MismatchError unless every value rounds to the printed number (decimal text, separated by spaces).
 
-    `off`: how much more it may differ, where the note computed from numbers of which it prints only some digits.
+    `off`: further difference allowed where the note computed with more digits than it prints.
     """
     found, texts = np.atleast_1d(np.asarray(values, dtype=np.float64)), printed.split()
     allowed = np.broadcast_to(np.asarray(off, dtype=np.float64), found.shape)

@@ -13,11 +13,11 @@ from hystgen.basics import console
 from hystgen.basics.version import __version__
 
 COMMANDS = ("emit", "verify", "simulate", "identify", "diagnose", "track", "show", "schema")
-"""Each in the module of its name."""
+"""The commands, each in a module of the same name."""
 
 
 class _Commands(console.Commands):
-    """Commands that are imported when they are asked for."""
+    """Commands that are imported on first use."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  for all groups
         return sorted(COMMANDS)

@@ -284,7 +284,7 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
 def _harmless(
     found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
 ) -> tuple[Outcome, list[WildInverse]]:
-    """The outcome, without effects whose inverse does more than the records bear out, and the finding about them."""
+    """The outcome, without effects whose inverse does more than the records support, and the finding about them."""
     from hystgen.model import Model
 
     if not found.found:

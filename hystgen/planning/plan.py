@@ -305,7 +305,7 @@ class _Player:
 
     @classmethod
     def of(cls, grid: Grid, tempo: Tempo, rate: float, dac: Dac | None, lengths: Sequence[int]) -> _Player:
-        """`lengths`: ticks of each record. Raises PlanError if there are more samples than a file should have."""
+        """A player for records of `lengths` ticks. Raises PlanError for more samples than a file should have."""
         every = tempo.every_of(1.0, SLOW_SAMPLES)
         made = cls(grid, tempo, rate, dac, lead_in(grid, tempo, every), every)
         samples = made.first + sum(lengths) + (len(lengths) - 1) * tempo.rest + 1

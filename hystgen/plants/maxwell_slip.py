@@ -19,8 +19,8 @@ class MaxwellSlip:
     `F = k v + sum k_i stop_(W_i / k_i)[v]`.
 
     `stiffnesses`: k_i > 0 in output per input unit; `slip_forces`: W_i > 0 in output units, the force at which element
-    i slips; `spring`: k >= 0, the spring that never slips. All start relaxed at the input 0. The output leads the
-    input, so as a play sum it has negative weights. Raises ValueError. Source: M. Goldfarb, N. Celanovic, Modeling
+    i slips; `spring`: k >= 0, the spring that never slips. All elements start relaxed at the input 0. The output leads
+    the input, so as a play sum it has negative weights. Raises ValueError. Source: M. Goldfarb, N. Celanovic, Modeling
     piezoelectric stack actuators for control of micromanipulation, IEEE Control Systems 17(3), 1997.
     """
 

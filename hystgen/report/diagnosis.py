@@ -126,7 +126,7 @@ def _noise(result: Result) -> Text:
 
 
 def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | HtmlTable]:
-    """`not_emitted`: why the compensators in the table cannot be emitted as C; empty if they can."""
+    """The effects found. `not_emitted`: why their compensators cannot be emitted as C; empty if they can."""
     if not result.effects:
         return [Text("No effect in the catalogue removes enough of the held-out error to be named.")]
     unit = result.unit

@@ -1,4 +1,4 @@
-"""An amplifier that follows by a share of the way each sample: a drive stage in front of the plays."""
+"""An amplifier that covers a fixed share of the remaining way in each sample: a drive stage in front of the plays."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from tests.oracle import check, effects
 
 
 def main() -> int:
-    """Exit code 0 where nothing was found, 1 otherwise."""
+    """Run the checks. Returns the exit code: 0 without faults, 1 otherwise."""
     parser = argparse.ArgumentParser(prog="python -m tests.oracle", description=__doc__)
     parser.add_argument("files", nargs="*", type=Path, help="parameter files; without any, random models")
     parser.add_argument("--models", type=int, default=300, help="number of random models")
@@ -31,7 +31,7 @@ def main() -> int:
         for a, e in check.COMBINATIONS
         if a == (asked.arithmetic or a) and e == (asked.engine or e)
     )
-    warnings.simplefilter("ignore", UserWarning)  # start memories that had to be projected
+    warnings.simplefilter("ignore", UserWarning)  # about projected start memories
     begun = time.perf_counter()
     if asked.files:
         tallies, faults = files(asked.files, combinations, asked.seeds, asked.calls)
@@ -53,7 +53,7 @@ def main() -> int:
 def files(
     paths: list[Path], combinations: tuple[tuple[str, str], ...], seeds: int, calls: int
 ) -> tuple[dict[tuple[str, str], check.Tally], list[check.Finding]]:
-    """Every combination for every parameter file."""
+    """Check every parameter file in every combination. Returns counts and faults."""
     tallies = {combination: check.Tally() for combination in combinations}
     faults = []
     for path in paths:

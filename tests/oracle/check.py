@@ -83,18 +83,18 @@ class Result(ctypes.Structure):
 
     @property
     def faults(self) -> int:
-        """Answers beyond a bound, and everything else that was wrong."""
+        """Number of answers beyond a bound and of everything else that was wrong."""
         return self.over_forward + self.over_single + self.over_own + self.over_same_branch + self.wrong
 
     @property
     def worst(self) -> float:
-        """Largest error over its bound."""
+        """Largest ratio of an error to its bound."""
         return max(self.worst_forward, self.worst_single, self.worst_own, self.worst_same_branch)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A parameter file that the package accepts, with what to emit of it."""
+    """A parameter file that the package accepts, and what to emit from it."""
 
     name: str
     yaml: str
@@ -106,7 +106,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the oracle says of one operator of a case."""
+    """Result of the oracle for one operator of a case."""
 
     case: Case
     operator: str
@@ -131,7 +131,7 @@ def _oracle() -> ctypes.CDLL:
 
 def compiled_library(sources: list[Path], library: Path, *flags: str) -> Path:
     """Compile a library against the headers of the oracle."""
-    quad = [] if platform.machine() in ("aarch64", "arm64") else ["-lquadmath"]  # there long double has 113 bits
+    quad = [] if platform.machine() in ("aarch64", "arm64") else ["-lquadmath"]  # long double has 113 bits on ARM
     command = ["gcc", "-std=gnu11", "-shared", "-fPIC", *flags, f"-I{HERE}", "-o", library, *sources, *quad, "-lm"]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     if done.returncode:
@@ -216,7 +216,7 @@ def _shim(case: Case) -> str:
 
 
 def emit(case: Case, folder: Path) -> Case | None:
-    """Write the C of a case; None where its numbers do not fit the arithmetic."""
+    """Write the C of a case. Returns what was emitted, None if its numbers do not fit the arithmetic."""
     path = folder / f"{case.name}.yaml"
     path.write_text(case.yaml)
     try:
@@ -235,7 +235,7 @@ def follow(cases: list[Case], folder: Path, calls: int = CALLS, shrink: float = 
     """Compile emitted cases into one library and run the oracle on each; `shrink` scales every stated bound."""
     source, library = folder / "batch.c", folder / "batch.so"
     source.write_text("".join(map(_shim, cases)))
-    compiled_library([source], library, "-O0", f"-I{folder}")  # what counts is the time to compile
+    compiled_library([source], library, "-O0", f"-I{folder}")  # -O0, since compiling takes most of the time
     loaded = ctypes.CDLL(str(library))
     oracle = _oracle()
     for case in cases:
@@ -250,7 +250,7 @@ def follow(cases: list[Case], folder: Path, calls: int = CALLS, shrink: float = 
 def follow_file(
     path: Path, arithmetic: str, engine: str, folder: Path, seeds: int, calls: int
 ) -> tuple[list[Finding], bool]:
-    """Findings of a parameter file, run with several seeds; whether it is refused."""
+    """Findings of a parameter file, run with several seeds, and whether it is refused."""
     text = path.read_text()
     name = YAML(typ="safe", pure=True).load(text)["name"]
     case = emit(Case(name, text, arithmetic, engine, 0), folder)
@@ -263,7 +263,7 @@ def follow_file(
 
 
 def trace(case: Case, operator: str, calls: int) -> list[Call]:
-    """The calls of a run once more, up to `calls`."""
+    """Repeat a run and return its first `calls` calls."""
     with tempfile.TemporaryDirectory(prefix="hystgen-oracle-") as name:
         folder = Path(name)
         emit(case, folder)
@@ -308,7 +308,7 @@ class Tally:
 
 
 class EmitError(Exception):
-    """Neither C nor a refusal: `finding` says what was raised."""
+    """Emission gave neither C nor a refusal; `finding` says what it raised."""
 
     def __init__(self, case: Case, error: Exception) -> None:
         super().__init__(str(error))
@@ -375,7 +375,7 @@ def table(tallies: dict[tuple[str, str], Tally]) -> str:
 
 
 def keep(faults: list[Finding], folder: Path) -> list[str]:
-    """Write the model and the calls of every fault into `folder`; one sentence each."""
+    """Write the model and the calls of every fault into `folder`. Returns a sentence for each."""
     folder.mkdir(parents=True, exist_ok=True)
     sentences = []
     for finding in faults:

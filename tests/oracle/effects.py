@@ -71,12 +71,12 @@ class Case:
 
     @property
     def effects(self) -> dict[str, dict[str, Any]]:
-        """Its effects by their names."""
+        """The effects by name."""
         return {each["name"]: each for each in self.data["model"]["effects"]}
 
     @property
     def ahead(self) -> int:
-        """Samples by which references come ahead."""
+        """Number of samples by which references are ahead of the motion."""
         late = self.effects.get("delay", {}).get("time", 0.0) / self.data["sample_time"]
         return int(np.ceil(late))
 
@@ -145,7 +145,7 @@ def model_of(case: Case) -> _Model:
 
 
 def drawn(seed: int, arithmetic: str) -> Case:
-    """A model of plays and some effects, each present in every other one and a limited rate in three of four."""
+    """A model of plays and random effects: most occur in half of the models, a limited rate in three of four."""
     rng = np.random.default_rng([seed, 53])
     seconds = float(10.0 ** rng.uniform(-5.0, -2.0))
     low, span = float(rng.choice([0.0, -50.0, -3.0])), float(10.0 ** rng.uniform(0.0, 2.0))
@@ -154,7 +154,7 @@ def drawn(seed: int, arithmetic: str) -> Case:
     weights = [float(rng.uniform(0.05, 1.0)), *(float(x) for x in rng.uniform(0.0, 0.3, n))]
     effects: list[dict[str, Any]] = []
     size = sum(weights) * (max(abs(low), abs(low + span)))
-    if rng.random() < 0.75:  # a crossing of the range takes 100 samples to millions
+    if rng.random() < 0.75:  # crossing the range takes from 100 to millions of samples
         rate = span / seconds / 10.0 ** rng.uniform(2.0, 6.5)
         effects.append({"name": "slew_limit", "rate": float(rate)})
         if rng.random() < 0.5:
@@ -192,7 +192,7 @@ def drawn(seed: int, arithmetic: str) -> Case:
 
 
 def text(data: dict[str, Any]) -> str:
-    """The parameter file; JSON is YAML, if its numbers have a point."""
+    """The parameter file; JSON is YAML if its numbers have a point."""
     return "\n".join(f"{key}: {_flow(value)}" for key, value in data.items()) + "\n"
 
 
@@ -212,7 +212,7 @@ def read(path: Path, arithmetic: str) -> Case:
 
 
 def emit(case: Case, folder: Path) -> bool:
-    """Write the C of a case; whether its numbers fit the arithmetic, and its noise gain is emitted unasked."""
+    """Write the C of a case. Returns False if its numbers do not fit or its noise gain is above the default limit."""
     path = folder / f"{case.name}.yaml"
     path.write_text(text(case.data))
     try:
@@ -230,7 +230,7 @@ def _shim(case: Case) -> str:
     lacking = ("temperature" * ("thermal" not in case.effects), "push" * (not case.ahead))
 
     def wrapped(op: str, call: str, result: str, *arguments: str) -> str:
-        """The name of a function that passes on a call, 0 for one that the module lacks."""
+        """Name of a function that passes a call on, or 0 if the module lacks the call."""
         if call in lacking:
             return "0"
         t, own = f"{name}_{op}_t", f"p_{name}_{op}_{call}"
@@ -259,7 +259,7 @@ def _shim(case: Case) -> str:
         f"#define ROUNDING_{macro} {macro}_INVERSE_ROUNDING_ERROR{ending}",
         f"#elif defined {macro}_INVERSE_MAX_ERROR{ending}",
         f"#define ROUNDING_{macro} {macro}_INVERSE_MAX_ERROR{ending}",
-        "#else",  # a bound of more than ten times the error found is left out, so that this is the stricter one
+        "#else",  # a bound above ten times the measured error is not stated, so this one is stricter
         f"#define ROUNDING_{macro} (10.0 * {macro}_INVERSE_MEASURED_ERROR{ending})",
         "#endif",
         f"#ifdef {macro}_INVERSE_MAX_ERROR{ending}",
@@ -273,8 +273,8 @@ def _shim(case: Case) -> str:
 
 
 def calls(case: Case, seed: int, samples: int, inverse: bool) -> NDArray[Any]:
-    """Calls of an operator: rests, ramps that are slow or faster than the drive may be, steps and a sine, within the
-    range of its argument; with commits, held samples, temperatures and a settled drive among them."""
+    """Calls of an operator within the range of its argument: rests, slow ramps, ramps faster than the drive may be,
+    steps and a sine, with commits, held samples, temperatures and settled drives among them."""
     rng = np.random.default_rng([seed, samples])
     low, high = case.data["input_range"]
     ends = (low, high)
@@ -327,7 +327,7 @@ def calls(case: Case, seed: int, samples: int, inverse: bool) -> NDArray[Any]:
 
 
 def _reachable(case: Case) -> tuple[float, float]:
-    """Displacements in the inner nine tenths of what the plays reach at rest; the module limits others."""
+    """The inner nine tenths of the displacements that the plays reach at rest; the module limits others."""
     pi, (low, high) = case.data["model"]["pi"], case.data["input_range"]
     effects = case.effects
     rest = 1.0 + sum(effects.get("creep", {}).get("weights", ()))

@@ -1,4 +1,4 @@
-"""Random parameter files over the space that the package accepts, for one arithmetic at a time."""
+"""Random parameter files of all kinds that the package accepts, for one arithmetic at a time."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 Generator = np.random.Generator
 
-# What fixed point can resolve: decades of weights and thresholds, relative to the largest
+# Decades of weights and thresholds below the largest that an arithmetic resolves
 DECADES = {"float32": 12.0, "float64": 12.0, "q31": 6.0, "q15": 2.5}
 MOST_PLAYS = {"float32": 64, "float64": 64, "q31": 48, "q15": 24}
 
 
 def parameters(rng: Generator, arithmetic: str, name: str) -> dict[str, Any]:
-    """A parameter file as plain data. Some are refused: what fits an arithmetic is the package's to decide."""
+    """A parameter file as plain data. Some are refused, since the package decides what fits an arithmetic."""
     fixed = arithmetic in ("q15", "q31")
     unit_in, unit_out = (10.0 ** (rng.uniform(-9, 9) if rng.random() < 0.5 else rng.uniform(-1, 2)) for _ in range(2))
     low, high = _range(rng, fixed)
@@ -35,14 +35,14 @@ def parameters(rng: Generator, arithmetic: str, name: str) -> dict[str, Any]:
     made: dict[str, Any] = {
         "hystgen": 1, "name": name, "input_range": [low * unit_in, high * unit_in], "model": model,
     }  # fmt: skip
-    if fixed and rng.random() < 0.2:  # coarser than has to be
+    if fixed and rng.random() < 0.2:  # coarser than necessary
         codes = (2**31 - 1) if arithmetic == "q31" else (2**15 - 1)
         made["emit"] = {"drive_lsb": max(map(abs, made["input_range"])) / codes * 10.0 ** rng.uniform(0.01, 1.5)}
     return made
 
 
 def _range(rng: Generator, fixed: bool) -> tuple[float, float]:
-    """In units of the drive: around 0, from 0, one-sided, far from 0."""
+    """Range of the drive: around 0, from or to 0, or away from 0."""
     kind = rng.integers(6)
     if kind == 0:
         return -1.0, 1.0
@@ -89,7 +89,7 @@ def _dead_zone(rng: Generator, low: float, high: float) -> dict[str, Any]:
 
 
 def _tanh(rng: Generator, low: float, high: float, two: bool) -> dict[str, Any]:
-    """An envelope whose arguments over the range stay below a few; with two branches the descending one above."""
+    """An envelope whose argument stays below about 2.5 over the range; a second, descending branch lies above."""
     ends = sorted(rng.uniform(-1, 1, 2) * rng.choice([0.2, 1.0, 2.5]))
     a1 = (ends[1] - ends[0]) / (high - low) + 1e-3 / (high - low)
     a2 = ends[0] - a1 * low
@@ -122,7 +122,7 @@ def _tanh_values(a: dict[str, float], x: np.ndarray[Any, Any]) -> np.ndarray[Any
 
 
 def _image(stages: list[dict[str, Any]], low: float, high: float) -> tuple[float, float]:
-    """Range behind the stages; each rises on both branches."""
+    """Range of the output of the stages, each of which rises on both branches."""
 
     def value(stage: dict[str, Any], x: float, branch: str) -> float:
         if stage["kind"] == "tanh":
@@ -155,12 +155,12 @@ def _plays(rng: Generator, arithmetic: str, w: tuple[float, float], with_inverse
         weights = 10.0 ** rng.uniform(-decades, 0, n + 1)
     elif kind == 1:
         weights = rng.uniform(0.2, 1, n + 1)
-    elif kind == 2:  # that falls
+    elif kind == 2:  # falling
         weights = np.exp(-np.arange(n + 1) * rng.uniform(0, 0.3 if arithmetic != "q15" else 0.1))
     else:
         weights = 10.0 ** rng.uniform(-1, 1, n + 1)
     p0 = rng.integers(4)
-    if p0 == 0 and n:  # flat before the first play follows
+    if p0 == 0 and n:  # flat until the first play follows
         weights[0] = weights[1:].sum() * 10.0 ** -rng.uniform(1, min(decades / 2, 6))
     elif p0 == 1:
         weights[0] = weights.max()
@@ -177,7 +177,7 @@ def _plays(rng: Generator, arithmetic: str, w: tuple[float, float], with_inverse
 
 
 def _thresholds(rng: Generator, arithmetic: str, n: int, span: float) -> list[float]:
-    """In the units of w: even, geometric, random, crowded, wider than the range."""
+    """Thresholds in the unit of the plays' input: even, geometric, random, crowded or wider than the range."""
     fixed = arithmetic.startswith("q")
     kind = rng.integers(6)
     reach = span * float(rng.choice([0.05, 0.4, 0.5, 1.0, 1.3, 100.0 if not fixed else 1.0]))
@@ -185,10 +185,10 @@ def _thresholds(rng: Generator, arithmetic: str, n: int, span: float) -> list[fl
         r = reach * np.arange(1, n + 1) / max(n, 1)
     elif kind == 1:
         r = reach * np.geomspace(10.0 ** -rng.uniform(0.5, {"q15": 2.0, "q31": 5.0}.get(arithmetic, 9.0)), 1, n)
-    elif kind == 2:  # neighbours apart by last bits
+    elif kind == 2:  # neighbours only some last bits apart
         least = {"q15": 2.0**-13, "q31": 2.0**-28, "float32": 2.0**-22}.get(arithmetic, 2.0**-50)
         r = reach * (rng.uniform(0.1, 1) + np.cumsum(rng.integers(1, 6, n)) * least * 2.0 ** rng.integers(0, 4))
-    elif kind == 3:  # in few groups
+    elif kind == 3:  # in a few groups
         centres = rng.uniform(0.05, 1, 3)
         r = reach * np.abs(rng.choice(centres, n) + rng.normal(0, 10.0 ** -rng.uniform(1, 3), n))
     else:
@@ -202,7 +202,7 @@ def _thresholds(rng: Generator, arithmetic: str, n: int, span: float) -> list[fl
 
 
 def _start(rng: Generator, r: np.ndarray[Any, Any], w: tuple[float, float]) -> float | list[float] | None:
-    """None, one number (inside, far outside), lists: left by a history, with slack, not admissible."""
+    """A start memory: none, one number (inside or outside), or a list (left by a history, with slack, inadmissible)."""
     n, span = len(r) - 1, w[1] - w[0]
     kind = rng.integers(8)
     if kind <= 1:
@@ -228,7 +228,7 @@ def _start(rng: Generator, r: np.ndarray[Any, Any], w: tuple[float, float]) -> f
 
 
 def _scale(model: dict[str, Any], unit_in: float, unit_out: float) -> None:
-    """To other units: the input of the first stage, the weights of the plays."""
+    """Convert the input of the first stage and the weights of the plays to other units."""
     stages = model.get("memoryless", [])
     stages = stages if isinstance(stages, list) else [stages]
     pi = model["pi"]

@@ -1,6 +1,6 @@
 """The catalogue's effects written from physics: how each is drawn for a bench, and what it does on the fine grid.
 
-`strength` scales an effect; at 0 it does nothing. `values` are the numbers of its form, which the label records.
+`strength` scales an effect; at 0 it does nothing. `values` are its physical parameters, which the label records.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ class Effect:
 class Surroundings:
     """Inputs of an effect: fine time and steps [s], drive [input], temperature [degC], the bench.
 
-    Strengths of what adds up refer to the end of a session: of `first`, where the plant has been in another one before.
+    Strengths of effects that accumulate refer to the end of the session, or of `first` if the plant went through that
+    one.
     """
 
     t: Array

@@ -80,7 +80,7 @@ def first_order(x: Array, dt: Array, tau: float) -> Array:
     return out
 
 
-# -- asymmetry: strain that is not even in the field -------------------------------------------------------------------
+# -- asymmetry: strain that is not linear in the field -----------------------------------------------------------------
 
 
 def draw_asymmetry(rng: np.random.Generator, bench: Bench) -> Effect:

@@ -216,7 +216,7 @@ def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | No
 
 
 def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherHistory | None:
-    """The same if a model fitted with the history can follow the starts only at the cost of the other samples.
+    """A finding if a model fitted with the history can follow the starts only at the cost of the other samples.
 
     `free`: the model fitted only to samples that do not depend on the history; it predicts the starts correctly. Starts
     that are off at no cost to the other samples may show an effect that fades.

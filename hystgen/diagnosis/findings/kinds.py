@@ -314,7 +314,7 @@ class NotAPlaySum(Finding):
 
 @dataclass(frozen=True)
 class WildInverse(Finding):
-    """Effects that were found but are not written, since their inverse does more than the recordings bear out.
+    """Effects that were found but are not written, since their inverse does more than the recordings support.
 
     `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model; `other`:
     the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: ratio of the second

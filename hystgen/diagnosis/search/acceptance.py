@@ -136,13 +136,13 @@ acceptance::equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
 """[share of the gap above the noise] Records of one loop support a name only if the effect leaves at most this share,
-and cannot separate effects that all do: two curves, one up and one down, hardly show which shape is right. Set by: 180
+and cannot separate several such effects: two curves, one up and one down, hardly show which shape is right. Set by: 180
 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not recorded)."""
 
 LEAST_EXPLAINED = 0.5
 """[share of the variance above the noise] Names stand only if together they leave at most this share of the held-out
-and of the fitted error, so that most is explained. A disturbance is explained less: for room temperature acting on the
-gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most
+and of the fitted error, so that most is explained. Less of a disturbance is explained: for room temperature acting on
+the gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most
 0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
@@ -180,7 +180,7 @@ all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdic
 
 FLAT_END = 0.005
 """[share of the drive range] A limit that begins closer to both ends than this is not named: the drive meets it only in
-holds at the end and in a few other samples, so it acts as an offset of those holds, which residual creep calls for.
+holds at the end and in a few other samples, so it acts as an offset of those holds, such as residual creep leaves.
 Wrong limits began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and 9165,
 blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
 
@@ -233,8 +233,8 @@ starts with up to 3.5 (a limit of the output has no effect beyond the measured r
 0f80f02, seeds not recorded)."""
 
 IDLE = 0.01
-"""[share of the error] A start that changes the error by less has no effect yet, and is left out if another start has:
-next to a large effect, every start for a further one may be worse than none. Changed by: blind pair."""
+"""[share of the error] A start that changes the error by less has no effect yet, and is left out if another start has
+one: next to a large effect, every start for a further one may be worse than none. Changed by: blind pair."""
 
 KEPT = 5
 """[shapes] After the screening, this many with the smallest held-out errors are followed up. Changed by: blind
@@ -681,7 +681,7 @@ PARITY_SHARE = 0.05
 """[share of the error's variance] Parity is meaningful only if the mean over drive and direction has at least this
 share: half of `VARIABLE_SHARE`. Derived."""
 
-# Whether an inverse does more than records bear out ------------------------------------------------------------
+# Whether an inverse does more than records support -------------------------------------------------------------
 
 WILDER = 2.0
 """[times] An inverse counts as calm if the second differences of its drive are up to this times those of the plain

@@ -1,4 +1,4 @@
-"""Whether the inverse of a model with effects does more than the recordings bear out.
+"""Whether the inverse of a model with effects does more than the recordings support.
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
 model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the

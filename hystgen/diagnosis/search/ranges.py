@@ -59,7 +59,7 @@ def _parts_at_an_end(now: Fitted) -> list[int]:
 def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
     """The part with its range widened by `acceptance.WIDER` usual widths beyond each end that a parameter has reached.
 
-    Only as far as the schema allows; the part itself if it allows nothing.
+    It is widened only as far as the schema allows; if that is not at all, the part itself is returned.
     """
     if part.firm:
         return part
@@ -75,7 +75,7 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a move `way` of parameter j to which the schema allows an effect unlike the present one.
+    """Largest share of a move `way` of parameter j that changes the effect and that the schema allows.
 
     The schema must allow a little more, for the slope that a search needs.
     """

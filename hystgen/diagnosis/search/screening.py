@@ -327,7 +327,7 @@ class _Trial(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """Parameters found by a search, held-out rms and start memories, which, unlike candidates, a process can send."""
+    """Parameters found by a search, held-out rms, start memories; unlike candidates, these can be pickled."""
 
     shape: Array
     weights: Array
@@ -409,8 +409,8 @@ class _Searches:
 def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
 
-    Failed steps do not end it: each increases the damping of the next, until one is short enough to lower the error.
-    Ending there once judged a strongly cubic sensor at the start of its search.
+    Failed steps do not end it: each increases the damping of the next, until one is short enough to lower the error. A
+    search that ended there once judged a strongly cubic sensor by its start.
     """
     for _ in range(acceptance.LONGER):
         before, search = search.now, search.further(steps, fits.COARSE)

@@ -146,7 +146,7 @@ def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Rem
 def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
     """Whether an effect removes enough from held-out or from fitted records, and shows in both.
 
-    In the kind of records held out, an effect may be small, however much of the fitted error it explains.
+    An effect may be small in records like the held-out ones, however much of the fitted error it explains.
     """
     shares = [each.removed / max(noise, each.left) for each in (held, fitted)]
     return max(shares) >= needed and min(shares) >= acceptance.SEEN_IN_BOTH
@@ -170,14 +170,14 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
     """Errors of a hypothesis with the free start states and offset of an effect, which do not count as its merit.
 
-    Or with the hypothesis's own free start states, if the error is then smaller. `terms`: from `Records.terms`.
+    Its own free start states are used instead if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
 
 
 def _only_grows(fitted: Fitted) -> Refusal | None:
-    """The refusal of a last effect that the records do not show level off."""
+    """The refusal of a last effect that does not level off within the records."""
     if not fitted.structure.parts or (levels_off := fitted.structure.parts[-1].candidate.levels_off) is None:
         return None
     place, most = levels_off
@@ -858,7 +858,7 @@ def _exchanged(
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
     """The step with the effect that replaces the named one, or None: its best, or one as good with fewer parameters.
 
-    The best of a step is chosen by differences of a few per cent, which records near the noise do not bear out. A shape
+    The best of a step is chosen by differences of a few per cent, which records near the noise do not support. A shape
     of the effect itself is preferred to another effect with as many parameters, unless the latter leaves less error.
     """
     every = [*records.to_fit, *records.held]
