@@ -69,8 +69,8 @@ def diagnose(
     comparison, although their drive still counts. `effects`: further effects to try.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
-    weights to the free-run error, and accepted if it removes a worthwhile part of the held-out error and chance does
-    not explain the gain. Raises RecordError, IdentificationError, ValueError.
+    weights to the free-run error, and accepted if it removes a substantial part of the held-out error and the gain is
+    not due to chance. Raises RecordError, IdentificationError, ValueError.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 4.0, 4000)
@@ -197,7 +197,7 @@ class _Case:
         )
 
     def _foreign(self, history: History) -> OtherHistory | None:
-        """A finding if the model can follow the history only at the cost of the other samples, else None."""
+        """A finding if the model fits the history only at the expense of the other samples, else None."""
         if history is None:
             return None
         ready, refit, _ = self._begun(history)
@@ -226,7 +226,7 @@ class _Case:
     def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
         """The search, repeated if nothing could be named although much error remains.
 
-        Then the end of each fitted record is held out too, since it may show what held-out records do not.
+        The repeat also holds out the end of each fitted record, which may show effects that held-out records do not.
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
@@ -257,9 +257,9 @@ class _Case:
 
 
 def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
-    """The outcome or, if better, the model that `identify` chooses on the same samples, with a note that says so.
+    """The outcome or, if better, the model that `identify` chooses on the same samples, with a note about the change.
 
-    `identify` is not tried if only noise is left: on all records or, if effects are named, on the held-out ones.
+    `identify` is not tried if only noise remains: on all records or, if effects are named, on the held-out ones.
     """
     left, of_fitted = records.residual(found.fitted), rms(found.fitted.errors(records.to_fit))
     if acceptance.is_noise(left if found.found else max(left, of_fitted), records.noise):

@@ -1,4 +1,4 @@
-"""From a search to the result: the effects found and their certainty, the remaining error, and where it is large."""
+"""The result of a search: the effects found and their certainty, the remaining error, and where it is large."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ONE_LOOP = (
     "all records follow one loop, which shows little more than one effect: add smaller loops inside it, other speeds "
     "and holds"
 )
-"""Advice about records of only one loop."""
+"""Advice for records that contain only one loop."""
 
 
 def result_of(
@@ -101,7 +101,7 @@ def reason(refused: Refusal, unit: str | None) -> str:
 
 
 def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
-    """The error that the withdrawn effects would leave."""
+    """The residual error with the withdrawn effects."""
     them = found.withdrawn
     if them is None:
         return None
@@ -157,7 +157,7 @@ def _in_digits(value: object) -> object:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """The remaining error that is neither noise nor a fault of the recording; `usual`: error on fitted records."""
+    """The remaining error beyond noise and recording faults; `usual`: error on fitted records."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
@@ -235,17 +235,17 @@ def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
 
 
 DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
-"""Thresholds of the plays that represent memory, as shares of the drive range."""
+"""Thresholds of the plays that represent memory, as fractions of the drive range."""
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants, in samples, of the averages of the drive that represent rates and creep."""
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""[share of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each about
-three times the previous one, from the smallest play up to five ranges. They explain 0.55 of the error that plays leave
-on a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep they never explain more than 0.09. Set by:
-benchmarks/chosen_numbers.py lengths."""
+"""[fraction of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each
+about three times the previous one, from the smallest play up to five ranges. They explain 0.55 of a play model's
+residual variance on a Bouc-Wen plant; four lengths explain 0.34, eleven 0.59; for creep, they never explain more than
+0.09. Set by: benchmarks/chosen_numbers.py lengths."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +269,7 @@ def displacement(item: Item) -> Array:
 
 
 def travel(item: Item) -> Array:
-    """Distance that the drive has travelled since the session began, as far as the records show it."""
+    """Distance that the drive has travelled since the session began, as far as recorded."""
     whole = item.session or item.run
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(whole.v)))])[item.part]
 
@@ -329,8 +329,8 @@ def described(
 
 
 def _rate_free(free: float, with_rates: float) -> bool | None:
-    """Whether drive and memory explain the error without rates; None if nothing explains much of it, or if rates add
-    little to a small share."""
+    """Whether drive and memory explain the error without rates; None if nothing explains much of the error, or if rates
+    add little to a small explained fraction."""
     if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
         return None
     if free > acceptance.RATE_FREE_SHARE * with_rates:
@@ -339,9 +339,9 @@ def _rate_free(free: float, with_rates: float) -> bool | None:
 
 
 def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[str, float]]:
-    """Shares of the errors' variance that a smooth function of one variable explains on samples it was not fitted to.
+    """Fractions of the error variance that a smooth function of one variable explains on samples it was not fitted to.
 
-    Returns the largest share, and those of the variables that matter.
+    Returns the largest fraction, and the fractions of the variables that matter.
     """
     found = {each.name: _share([each.of(item) for item in items], errors) for each in VARIABLES}
     mattering = {name: round(share, 4) for name, share in found.items() if share > acceptance.VARIABLE_SHARE}
@@ -349,7 +349,7 @@ def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[
 
 
 def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
-    """Cross-validated share explained by one variable: means over bins with equal numbers of samples."""
+    """Cross-validated fraction explained by one variable through its means over bins with equal numbers of samples."""
     x = np.concatenate([v[np.isfinite(e)] for v, e in zip(values, errors, strict=True)])
     e = np.concatenate([e[np.isfinite(e)] for e in errors])
     if len(e) < acceptance.DESCRIBED_SAMPLES or np.ptp(x) == 0.0:
@@ -372,11 +372,11 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over its travel),
+    """Cross-validated fractions explained by rate-free variables (drive, plays, averages of the drive over its travel),
     and by these together with averages over several times, which represent rates and creep.
 
-    The error of hysteresis that plays cannot follow depends on both kinds of averages; only the gain from the second
-    kind is due to rates.
+    Hysteresis that plays cannot follow causes an error that depends on both kinds of averages; only the second kind's
+    gain is due to rates.
     """
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)
@@ -411,7 +411,7 @@ def _averaged(v: Array, decay: float) -> Array:
 
 
 def _averaged_over_travel(v: Array, length: float) -> Array:
-    """The same over the drive's travel: independent of the rate, and constant while the drive rests."""
+    """Averages over the drive's travel: independent of the rate, and constant while the drive rests."""
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
     if travelled[-1] == 0.0:
         return v
@@ -423,7 +423,7 @@ def _averaged_over_travel(v: Array, length: float) -> Array:
 
 
 def _regressed(x: Array, e: Array) -> float:
-    """Cross-validated share of e (N,) explained by a linear regression on rows x (k, N) with a small ridge."""
+    """Cross-validated fraction of e (N,) explained by a linear regression on rows x (k, N) with a small ridge."""
     fold = _folds(len(e))
     unexplained = 0.0
     for k in (0, 1):
@@ -435,7 +435,7 @@ def _regressed(x: Array, e: Array) -> float:
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Share of the error's variance that recurs when the drive repeats itself; None if the drive never does."""
+    """Fraction of the error's variance that recurs when the drive repeats itself; None if the drive never does."""
     products = powers = 0.0
     count = 0
     for item, error in zip(items, errors, strict=True):
@@ -454,7 +454,7 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 
 
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Even share of the mean error over drive and direction: the part unchanged when both are reversed.
+    """Even fraction of the mean error over drive and direction: the part unchanged when both are reversed.
 
     None if that mean is small compared with the error.
     """

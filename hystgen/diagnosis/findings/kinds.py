@@ -36,15 +36,15 @@ class Finding(ABC):
         """The entry as a sentence without a full stop; `unit`: of the displacement."""
 
     def advice(self) -> list[str]:
-        """Experiments that would reveal more about it, one sentence each."""
+        """Experiments that would reveal more about the finding, one sentence each."""
         return []
 
 
 @dataclass(frozen=True)
 class Fault(Finding):
-    """A recording fault that is left out of the comparison or put right; the rest of the record is sound.
+    """A fault in part of a recording, left out of the comparison or put right; the rest of the record is sound.
 
-    `noun`: the noun counted in a sentence; `qualifier`: the words after it.
+    `noun`: the noun counted in its sentence; `qualifier`: the words after the noun.
     """
 
     noun: ClassVar[str]
@@ -61,7 +61,7 @@ class Fault(Finding):
 
 @dataclass(frozen=True)
 class SwappedChannels(Fault):
-    """A record with drive and displacement exchanged, which was put right."""
+    """A record whose drive and displacement columns were swapped and have been put right."""
 
     kind, noun, qualifier = "swapped_channels", "record", " with exchanged columns"
     record: str
@@ -198,7 +198,7 @@ class IsolatedSamples(Fault):
 
 @dataclass(frozen=True)
 class Line(Finding):
-    """A spectral line at a frequency, Hz; `share`: of the error's variance in the `records` that have it."""
+    """A spectral line at a frequency, Hz; `share`: its fraction of the error variance in the `records` that show it."""
 
     kind = "line"
     optional = frozenset(("mains", "repaired"))
@@ -275,12 +275,12 @@ class StickSlip(Finding):
 
 @dataclass(frozen=True)
 class NotAPlaySum(Finding):
-    """Hysteresis that forgets all along the drive's travel, not only where minor loops close.
+    """Hysteresis that forgets continuously as the drive travels, not only where minor loops close.
 
-    `before`: held-out rms that plays and named effects leave; `after`: the same with an added element that forgets over
-    `way`, a share of the drive range; `open`: gap left by a minor loop over a tenth of the range, as a share of its
-    height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive covers equal
-    distances in different times.
+    `before`: held-out rms error with plays and named effects; `after`: the same with an added element that forgets over
+    `way`, a fraction of the drive range; `open`: gap left by a minor loop over a tenth of the range, as a fraction of
+    its height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive covers
+    equal distances in different times.
     """
 
     kind = "not_a_play_sum"
@@ -305,7 +305,7 @@ class NotAPlaySum(Finding):
         )
 
     def advice(self) -> list[str]:
-        """Where to read how much a play sum leaves on such a stage, and how to separate effects of speed."""
+        """Where to read about the residual error on such a stage, and how to identify speed-dependent effects."""
         page = "docs/plants.md shows how much a play sum leaves on a stage with such hysteresis"
         if self.shows_speed:
             return [page]
@@ -316,7 +316,7 @@ class NotAPlaySum(Finding):
 class WildInverse(Finding):
     """Effects that were found but are not written, since their inverse does more than the recordings support.
 
-    `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model; `other`:
+    `moves`: rms change that the inverse with them causes in the plain model's output, over recorded outputs; `other`:
     the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: ratio of the second
     differences of its drive to those of the plain inverse's drive.
     """
@@ -348,12 +348,12 @@ VARIABLE_NAMES = {
 
 @dataclass(frozen=True)
 class Structured(Finding):
-    """An error that is not noise and that no effect removes.
+    """An error above the noise that no effect removes.
 
-    `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples not used to fit
-    them; `main_variable`: the variable with the largest share, None if none matters; `rate_free`, `repeatable`: None if
-    the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive and
-    direction; `held_out_alone`: held-out records that show it although the fitted ones do not.
+    `share_by_variable`: fractions of its variance that smooth functions of one variable explain on samples not used to
+    fit them; `main_variable`: the variable with the largest fraction, None if none matters; `rate_free`, `repeatable`:
+    None if the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive
+    and direction; `held_out_alone`: held-out records that show it although the fitted ones do not.
     """
 
     kind = "structure"
@@ -372,7 +372,7 @@ class Structured(Finding):
         return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
 
     def words(self) -> str:
-        """The dependence of the error, as a predicate."""
+        """What the error depends on, as a predicate."""
         parts = []
         if self.main_variable:
             share = 100.0 * self.share_by_variable[self.main_variable]
@@ -405,7 +405,7 @@ class Structured(Finding):
 
 
 EVEN = 0.3, 0.7
-"""Even shares below which an error is called odd, and above which it is called even."""
+"""Even fractions below which an error is called odd, and above which it is called even."""
 
 
 # Words -------------------------------------------------------------------------------------------------------
@@ -433,8 +433,8 @@ def several(names: Sequence[str]) -> str:
 
 
 MANY = 100.0
-"""[times the noise] Larger ratios are not stated as figures: two digits end here, and the noise, which is only an
-estimate, supports no more. Only wording depends on it. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
+"""[times the noise] Larger ratios are not printed as numbers: they would need three digits, more than the estimated
+noise supports. Only the wording depends on this. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:

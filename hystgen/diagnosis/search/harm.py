@@ -1,8 +1,8 @@
 """Whether the inverse of a model with effects does more than the recordings support.
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
-model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the
-error under the other's compensator. A correct effect changes the output by about as much as it explains.
+model, and the plain inverse's drive into the model with effects: if one model were the stage, this would be the error
+with the other model's compensator. A correct effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Wild:
     """An inverse that does more than the recordings support.
 
     `moves`: rms difference between the reference and the plain model's output for its drive; `other`: the same with the
-    two models exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: rms second
-    difference of its drive over that of the plain inverse's drive.
+    two models exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: its drive's rms
+    second difference, divided by that of the plain inverse's drive.
     """
 
     moves: float
@@ -48,7 +48,7 @@ class Wild:
 
 
 def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
-    """How far the inverse with effects exceeds their `gain` in the worst held-out record; None if it does not.
+    """How far the inverse's changes exceed the effects' `gain` in the worst held-out record; None if they do not.
 
     The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
