@@ -1,4 +1,4 @@
-"""Settings that a fit keeps from the parameter file it replaces: everything that records do not determine."""
+"""Settings that a fit keeps from the parameter file that it replaces: everything that records do not determine."""
 
 from __future__ import annotations
 

@@ -34,17 +34,17 @@ STARTS, UNLIKE = 8, 3.0
 estimated memory is taken to be wrong."""
 
 ROUNDING = 1e-6
-"""Share of the output range below which errors are only rounding, as in records computed without noise."""
+"""Fraction of the output range below which errors are only rounding, as in records computed without noise."""
 
 LEAST_KNOWN = 0.5
-"""If at least this share of a record's samples has a known memory, the samples before them are left out: a start memory
-fitted to those would flatter the model being judged. This rejects none of 56 simulated records without a history, and
-the median held-out error is 1.00 times that with the true history; with 0.25 it is 1.02 times."""
+"""If the memory is known for at least this fraction of a record's samples, the earlier samples are left out: a start
+memory fitted to them would flatter the model being judged. This rejects none of 56 simulated records without a history,
+and the median held-out error is 1.00 times that with the true history; with 0.25 it is 1.02 times."""
 
 PLAYS = 12
-"""Number of thresholds for which start memories are estimated: the middle of the numbers of plays that default fits
-try. Given thresholds are used instead if there are no more than this and the records move their plays; time grows with
-the cube of their number."""
+"""Number of thresholds for which start memories are estimated: the middle one of the numbers of plays that fits try by
+default. Given thresholds are used instead if there are no more than this and the records move their plays; time grows
+with the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """Reciprocal of the standard deviation of a slope that is uniform from -1 to 1."""
@@ -101,9 +101,9 @@ def needed(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
+    """The courses, with a start memory (`estimated`) for each course with too few comparable samples otherwise.
 
-    `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move; their
+    `least`: fraction of a course's samples that is enough; `largest`: threshold above which plays hardly move; their
     memory is ignored if waiting for it would leave too little to compare and no start memory is found.
     """
     known = [_enough(item, least, largest) for item in courses]
@@ -125,7 +125,7 @@ def of_model(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """Courses on which a model is judged: its weights stay fixed, and the starts of courses not `lacking` are ignored.
+    """The courses for judging a model with fixed weights; the starts of courses that are not `lacking` are ignored.
 
     `least`, `largest`: as in `needed`.
     """
@@ -149,8 +149,7 @@ def unknown(item: Course, largest: float = math.inf) -> Course:
 
 
 def _enough(item: Course, least: float, largest: float) -> Course:
-    """The course from where every play is known or, if that leaves too little, from where those up to the threshold
-    `largest` are."""
+    """The course from where every play is known or, if that is too short, every play up to threshold `largest`."""
     exact = unknown(item)
     return exact if exact.used >= least * _whole(item).used else unknown(item, largest)
 
@@ -164,7 +163,7 @@ def findable(item: Course) -> bool:
 
 
 def lacking(item: Course, least: float) -> bool:
-    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found."""
+    """Whether less than a fraction `least` of a course is comparable without a start memory, and one can be found."""
     return findable(item) and unknown(item).used < least * _whole(item).used
 
 
@@ -268,7 +267,7 @@ class _Bounds:
 
 @dataclass(frozen=True)
 class _System:
-    """One course: the rows from the sample at which no play depends on the start any more, and the samples before."""
+    """One course: the rows from the sample at which no play depends on the start any more, and the earlier samples."""
 
     item: Course
     r: Array
@@ -304,8 +303,7 @@ class _System:
         return [np.zeros(n), np.diff(virgin) / np.diff(self.r), *turned]
 
     def rows(self, slopes: Array, p: Array) -> Array:
-        """Rows `[plays (n+1), change with the slopes.., y]` linearised about these slopes and weights, the offset
-        projected out.
+        """Rows `[plays (n+1), change with the slopes.., y]` linearised about slopes and weights, offset projected out.
 
         A play that has not moved yet is a constant; once it has moved, the output does not depend on its start.
         """
@@ -326,7 +324,7 @@ class _System:
         return table[1:, 1:]
 
     def left(self, slopes: Array, p: Array) -> float:
-        """Root of the sum of squared errors for a memory and weights, found without reducing a table of all plays."""
+        """Root of the sum of squared errors for a memory and weights, without reducing a table of all plays."""
         item, begin = self.item, min(self.item.begin, self.settled)
         states = float(item.v[0]) + memory_of(slopes, self.r)
         output = operators.play_sum(item.v[: self.settled], self.r, states, p)
@@ -404,7 +402,7 @@ class _Search:
         return np.concatenate(shape)
 
     def _left(self, system: _System, slopes: Array) -> float:
-        """The error that a memory leaves on one course, with the best weights for that course unless they are known."""
+        """The residual error with a memory on one course, with its best weights unless weights are known."""
         if self.known is not None:
             return system.left(slopes, self.known)
         alone = replace(self, systems=(system,))
