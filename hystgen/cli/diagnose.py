@@ -1,4 +1,4 @@
-"""`hystgen diagnose`: what a model is missing, and the drives that show it."""
+"""`hystgen diagnose`: find what a model is missing, and plan the drives that reveal it."""
 
 from __future__ import annotations
 

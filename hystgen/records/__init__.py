@@ -146,8 +146,8 @@ def in_units(
     named: tuple[str, Mapping[str, str] | None] = ("units", None),
     sources: Sequence[object] = (),
 ) -> list[Record]:
-    """The records with each column of `need`, and temperatures, in one unit throughout; each conversion adds a note to
-    its record.
+    """The records with each column of `need`, and temperatures, in a single unit; each conversion adds a note to the
+    record.
 
     The target units are the user's (`named`: the option's name and the units of `input` and `output`), else those of a
     parameter file (`file`: its path and units), else those of `model`; if there are none, the first record with a unit
@@ -162,7 +162,7 @@ def in_units(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One source of a record, or several, as a list. Raises TypeError for anything else."""
+    """One record source, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)

@@ -101,7 +101,7 @@ def _offset(zone: str | None) -> int:
     return (-60 if zone[0] == "-" else 60) * (60 * int(digits[:2]) + int(digits[2:]))
 
 
-# Numbers, and what separates cells ---------------------------------------------------------------------------
+# Numbers and cell separators ---------------------------------------------------------------------------------
 
 
 MISSING = frozenset(
@@ -111,7 +111,7 @@ MISSING = frozenset(
 """Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "
-"""The delimiter of columns separated by any number of blanks, for example to align them."""
+"""The delimiter of columns that are separated by any number of blanks, for example for alignment."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
 """The beginning of a comment line."""
@@ -122,7 +122,7 @@ _THOUSANDS = (
 )
 
 _EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-"""A number whose comma may be a decimal comma or a thousands mark."""
+"""A number with a comma that may be a decimal comma or a thousands mark."""
 
 _MINUTES = re.compile(r"\d+:\d{2}(?:[.,]\d+)?")
 

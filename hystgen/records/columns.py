@@ -1,4 +1,4 @@
-"""Columns of a file: their names, units and sample rates, and which of them we use."""
+"""Columns of a file: names, units, sample rates, and the choice of those to use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import printable
 from hystgen.records.record import Array, Record
 
-# Units: how headers write them, which ones are times, and what several records agree on ----------------------
+# Units: notation in headers, units of time, and units agreed on by several records ---------------------------
 
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
@@ -50,7 +50,7 @@ def split_unit(header: str) -> tuple[str, str]:
     """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
-    # In square brackets anything is a unit except a number, which is that of a channel
+    # In square brackets, anything is a unit except a number, which is a channel number
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
@@ -183,7 +183,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # A word that has its own value is not a unit but the next entry of the line
+            # A word with a value of its own is not a unit but the next entry in the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -227,7 +227,7 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
     return Step(seconds, f"{said} ({printable(where)}{'' if text else ', without a unit'})")
 
 
-# Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
+# Assignment of a file's columns to ours: t, v, y, u ----------------------------------------------------------
 
 
 LISTED = 20
@@ -257,7 +257,7 @@ OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
      "state", "offset", "gain", "scale", "constant", "range")
 )
-"""Words for things other than the quantity itself."""
+"""Words in column names for things other than the quantity itself."""
 
 COUNTING = frozenset(("index", "scan", "sample", "chunk", "no", "nr", "number", "row", "point", "count", "segment"))
 """Words in the names of columns that count rows."""
@@ -312,7 +312,7 @@ def meaning(c: Column) -> str:
     timed = is_time_unit(c.unit)
     found = {ours for ours, known in DECIDE.items() if words & known}
     found = found or {ours for ours, known in MEANINGS.items() if words & known}
-    # A column with a unit is a time if and only if that is a unit of time
+    # A column with a unit is a time if and only if the unit is a unit of time
     if c.unit and timed != ("t" in found):
         return ""
     return found.pop() if len(found) == 1 else ""
@@ -462,14 +462,13 @@ class Finder:
         return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
-        """How to refer to a column in `--columns`: its name, or its number if the name is not unique or contains a
-        comma."""
+        """How to refer to a column in `--columns`: its name, or its number if the name is ambiguous or has a comma."""
         alone = sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
     def _one(self, ours: str, required: bool) -> Column | None:
         theirs = self.mapping.get(ours, ours)
-        # A path in an HDF5 file may be given from its root, as other tools print it
+        # A path in an HDF5 file may start at the root, as other tools print it
         exact = [c for c in self.columns if c.name in (theirs, theirs.removeprefix("/"))]
         if not exact and theirs[:1] == "#" and theirs[1:].isdecimal():
             place = int(theirs[1:])

@@ -1,4 +1,4 @@
-"""Units of columns: which ones measure the same quantity, and how to convert records to the units of a model.
+"""Column units: comparison of quantities, and conversion of records to the units of a model.
 
 Lengths, voltages and so on are converted by their SI prefixes, temperatures by scale and zero. The meaning of an
 unknown unit is never guessed; it is only compared as text.
@@ -68,7 +68,7 @@ TEMPERATURES = {
 
 
 class Quantity(NamedTuple):
-    """What a unit measures: `kind`, named by its base unit; the `size` and `zero` of the unit in that base unit."""
+    """A unit's quantity: `kind`, named by its base unit, with `size` and `zero` of the unit in that base unit."""
 
     kind: str
     size: Fraction
@@ -104,8 +104,7 @@ class Conversion(NamedTuple):
     plus: Fraction = Fraction(0)
 
     def __call__(self, x: Array) -> Array:
-        """The numbers (N,) in the other unit; if the factor is a power of ten, each is the double nearest to the exact
-        value."""
+        """The numbers (N,) in the other unit; with a power of ten, each is the double nearest to the exact value."""
         top, bottom = self.times.numerator, self.times.denominator
         found: Array = x / bottom if top == 1 else x * float(top if bottom == 1 else self.times)
         return found + float(self.plus) if self.plus else found

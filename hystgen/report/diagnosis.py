@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page on the missing effects, their share of the error, and the remaining error."""
+"""The report of a diagnosis: one page on the missing effects, the error due to each, and the remaining error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and by what method."""
+"""Accuracy and method of a compensator's correction for a stage in front of the plays."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: object, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high end, one per number; equal lists are represented by the first."""
+    """Rows of name, value, lower and upper end, one per number; equal lists are represented by the first."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
