@@ -809,10 +809,10 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     assert found.verdict == "nothing_missing"
     assert any("90 of 660 samples are compared" in note and "--history" in note for note in found.notes)
     short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples at most .*--history"):
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: at most \d in a .*--history"):
         hystgen.diagnose(path, short, holdout=short)
     last = record(v[:600], np.asarray(sweep.y)[:600], "last")  # it ends at its largest drive
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: there is too little to fit: 1 sample at"):
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: too few samples to fit: at most 1 in a"):
         hystgen.diagnose(path, last, holdout=last)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
@@ -890,9 +890,9 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     held = made[4:] if held_out else made[3:]
     found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
     spec = " ".join(found.notes)
-    assert ("sweep: there is too little to judge by" in spec) is held_out
+    assert ("sweep: too few samples to judge by" in spec) is held_out
     assert ("held-out record was given: c set aside" in spec) is held_out
-    assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
+    assert ("sweep: only 1 sample compared" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
 

@@ -213,7 +213,7 @@ def check_options(
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:
-        raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
+        raise ValueError(f"p0_floor must be a fraction of the sum of weights, from 0 to below 1, not {p0_floor}")
     return how, before
 
 
@@ -319,10 +319,10 @@ def _checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[flo
         return None
     if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool):
         if not 0 <= wanted <= MOST_PLAYS:
-            raise ValueError(f"thresholds is a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
+            raise ValueError(f"thresholds must be a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
         return int(wanted)
     if isinstance(wanted, str | float | bool):
-        raise ValueError("thresholds is a whole number of plays or a list of thresholds")
+        raise ValueError("thresholds must be a whole number of plays or a list of thresholds")
     places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
     if not places or places[0] != 0.0:
         places = (0.0, *places)
@@ -341,10 +341,10 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         )
     if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
         if not 1 <= breaks <= MOST_BREAKS:
-            raise ValueError(f"breaks is a number from 1 to {MOST_BREAKS}, not {breaks}")
+            raise ValueError(f"breaks must be a number from 1 to {MOST_BREAKS}, not {breaks}")
         return int(breaks)
     if isinstance(breaks, str | float | bool):
-        raise ValueError("breaks is a whole number or a list of drive values")
+        raise ValueError("breaks must be a whole number or a list of drive values")
     places = tuple(x for x in arguments.numbers("breaks", breaks, "[-20, 20]") if x != 0.0)
     if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("breaks must be finite, strictly increasing drive values, with at least one besides 0")

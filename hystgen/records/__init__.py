@@ -193,7 +193,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
 def _check_arrays(record: Record) -> None:
     """Raise ValueError or TypeError unless a record consists of one-dimensional arrays of numbers."""
     if not isinstance(record.name, str):
-        raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
+        raise TypeError(f"a record's name must be text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():
         found = arguments.signal(f"{name} of {record.name}", values)
         if name not in ("v", "y") and len(found) != len(record.t):

@@ -319,7 +319,7 @@ CAPTIONS = {
     "dotted: what each step removes. The dashed line is the noise, measured without a model.",
     "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted.",
     "records": "rms error of every record, against the noise.",
-    "time": "rms error in stretches of the records, along the session.",
+    "time": "rms error in stretches of the records over the session.",
     "against": "Mean and scatter of the error on all records against possible causes. A mean that leaves the "
     "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
     "reversals of the drive. While the drive rests, the error is counted in the direction of its last move.",
@@ -330,7 +330,7 @@ ALTERNATIVES = {
     "gap": "The held-out error after each step, down to the noise.",
     "overlay": "Measured and predicted displacement over time, and below it the error before and after.",
     "records": "Points for the rms error of every record before and after, with the noise as a line.",
-    "time": "rms error before and after along the session, with the noise as a line.",
+    "time": "rms error before and after over the session, with the noise as a line.",
     "against": "Six panels of binned errors before and after against drive, rate, displacement, loop centre, session "
     "time and time since the drive stopped, with the noise.",
     "frequency": "Spectral density of the error before and after, with that of white noise.",

@@ -201,7 +201,7 @@ def _table(fit: Fit) -> list[Text | HtmlTable | Listing]:
         blocks.append(
             Text(
                 f"{chosen.model} was chosen: of the candidates, the simplest first, it is the first whose held-out "
-                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the least, {best:.4g}"
+                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the smallest, {best:.4g}"
                 f"{f' {fit.unit}' if fit.unit else ''}."
             )
         )

@@ -314,7 +314,7 @@ def prepare(
                 repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
         edges = np.count_nonzero(unresolved_edges(course.v)[course.first :])
         if edges:
-            notes.append(f"{course.name}: {counted(int(edges), 'sample')} at steps within one or two not compared")
+            notes.append(f"{course.name}: {counted(int(edges), 'sample')} not compared, at jumps of the drive")
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
@@ -323,7 +323,7 @@ def prepare(
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no usable held-out record was given: the last {share} of each is set aside")
     if not all(item.timed for item in (*to_fit, *held)):
-        notes.append("not every record has a time: effects that depend on it are not sought; give --sample-time")
+        notes.append("not every record has a time: time-dependent effects are not tried; give --sample-time")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
@@ -464,13 +464,12 @@ def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
     if all(start.findable(course) for course in courses) and not enough(courses, share):
         most = max(_comparable(course) for course in courses)
         return (
-            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, but more than "
-            f"{least:.0f} are needed; record more"
+            f"{names}: too few samples to {what}: at most {most} in a record, but more than {least:.0f} are needed; "
+            "record more"
         )
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record after the start, "
-        f"whose memory is unknown, but more than {least:.0f} are needed; give --history, "
-        "or records that sweep their range again"
+        f"{names}: too few samples to {what}: at most {most} in a record after the start, whose memory is unknown, but "
+        f"more than {least:.0f} are needed; give --history, or records that sweep their range again"
     )
 
 
@@ -481,7 +480,7 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
         number = int(np.count_nonzero(compared))
         if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
-                f"{name}: says next to nothing, {counted(number, 'sample')} compared; if its start memory is unknown, "
+                f"{name}: only {counted(number, 'sample')} compared, of little use; if its start memory is unknown, "
                 "give --history, or let it sweep its range again"
             )
         elif np.argmax(compared) > len(compared) // 2:
@@ -518,7 +517,7 @@ def with_ends(ready: Prepared) -> Prepared | None:
         return None
     to_fit, held = parted(ready.to_fit)
     share = f"{100 * acceptance.SET_ASIDE:g} %"
-    note = f"the held-out records alone allow no name: the last {share} of each fitted record is held out too"
+    note = f"the held-out records alone support no name: the last {share} of each fitted record is held out too"
     return replace(ready, to_fit=to_fit, held=[*ready.held, *held], notes=[*ready.notes, note])
 
 

@@ -306,7 +306,7 @@ class NotAPlaySum(Finding):
 
     def advice(self) -> list[str]:
         """Where to read about the residual error on such a stage, and how to identify speed-dependent effects."""
-        page = "docs/plants.md shows how much a play sum leaves on a stage with such hysteresis"
+        page = "docs/plants.md shows the residual error of a play sum on a stage with such hysteresis"
         if self.shows_speed:
             return [page]
         return [page, "record the same path at two speeds: a lag, creep and rate dependence then differ from it"]
@@ -455,4 +455,4 @@ def _not_compared(samples: int, first: float | None) -> str:
 
 
 def _taken_out(repaired: bool) -> str:
-    return "; taken out of the records before effects were sought" if repaired else ""
+    return "; removed from the records before the search for effects" if repaired else ""
