@@ -68,7 +68,7 @@ def diagnose(
     dac_coding: str | None, session: str | None, history: str | None, rest: float, skip: float,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
-    """Find what a model is missing: where it disagrees with records, which effect is missing, and the model with it.
+    """Find what a model is missing: where it disagrees with records, the missing effects, and the model with them.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
 

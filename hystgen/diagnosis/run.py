@@ -59,14 +59,14 @@ def diagnose(
     delimiter: str | None = None,
     progress: bool = False,
 ) -> Diagnosis:
-    """Find what a nominal model is missing.
+    """Find the effects that a nominal model is missing.
 
     `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
     for `identify` and converted to the model's units; `holdout`: records with other waveforms, by which models are
     judged; if none are given, or too few of their samples can be compared, every third record, or the end of each, is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
-    `rest`: pause after them in seconds. `skip`: seconds at the start of every record that are left out of the
-    comparison, although their drive still counts. `effects`: further effects to try.
+    `rest`: pause after them in seconds. `skip`: seconds at the start of every record that are not compared, although
+    their drive still moves the plays. `effects`: further effects to try.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
     weights to the free-run error, and accepted if it removes a substantial part of the held-out error and the gain is
@@ -303,7 +303,7 @@ def _harmless(
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:
-    """Whether the static part of the written model has an inverse, and what the user should know about it."""
+    """Whether the static part of the written model has an inverse, and warnings about it for the user."""
     from hystgen.model import cascade_of
 
     problems = cascade_of(extended).inverse_problems()

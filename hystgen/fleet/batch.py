@@ -53,10 +53,10 @@ COLUMNS = ("unit", "file", "status", "message", *FIGURES, "outlier", "outlier_in
 class Unit:
     """One row of the summary.
 
-    `name`: C identifier of the model; `file`: its record; `done`: whether it succeeded, otherwise `message` says in one
-    line what failed; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from the rest, and by
-    how much; empty if there are none; `sha256`: hash of records, options, settings and tool version; `kept`: whether an
-    earlier call did the work; `settings`: keys kept from the existing parameter file.
+    `name`: C identifier of the model; `file`: its record; `done`: whether it succeeded, otherwise `message` describes
+    the failure in one line; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from the rest,
+    and by how much; empty if there are none; `sha256`: hash of records, options, settings and tool version; `kept`:
+    whether an earlier call did the work; `settings`: keys kept from the existing parameter file.
     """
 
     name: str
@@ -157,7 +157,7 @@ def identify_batch(
 
     A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
     does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
-    An interrupted call leaves only complete files and keeps its finished units. When an existing parameter file is
+    After an interrupted call, all files are complete and finished units are kept. When an existing parameter file is
     rewritten, its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error (logarithm of %) far above the

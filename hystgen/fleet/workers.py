@@ -66,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True)
 class UnitResult:
-    """The result of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
+    """The result of a task: text of the parameter file, C files by name, figures; `message` describes the failure."""
 
     unit: str
     message: str = ""

@@ -93,9 +93,9 @@ def identify(
       output; that part preserves the length of the drive range and the position of 0); by default both number and
       thresholds are chosen by blocked validation on the records.
     - `breaks`: the number of points at which a dead-zone sum may bend, or their drives; by default chosen the same way.
-    - `holdout`: records that decide nothing except which model `auto` takes, and whether `gpi-tanh` has one branch or
-      two. Without them, a trial model is fitted without the last quarter of each record, which gives the held-out
-      figures; the model written is then fitted to everything.
+    - `holdout`: records that affect only the choice of the model by `auto` and of one or two branches for `gpi-tanh`.
+      Without them, a trial model is fitted without the last quarter of each record, which gives the held-out figures;
+      the model written is then fitted to everything.
     - `history`: drive values visited before every record, starting from the virgin state. Without it, the start of each
       record is ignored until the drive has wiped the relevant memory; if less than half of the record remains, its
       start memory is estimated together with the weights.
@@ -458,7 +458,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 
 def identifier_from(text: str) -> str:
-    """A C identifier made from any text, such as a file's stem; `stage` if no usable character is left."""
+    """A C identifier made from any text, such as a file's stem; `stage` if no usable character remains."""
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"

@@ -186,7 +186,7 @@ def pulses(v: Array) -> list[tuple[int, int]]:
 
 
 def returns(v: Array, first: int, last: int) -> bool:
-    """Whether the drive leaves its course at samples [first, last), by a sizeable part of its range, and comes back.
+    """Whether the drive departs from its course at samples [first, last) by a sizeable part of its range, and returns.
 
     At the end of a record, where the drive cannot come back, it has to stand out as well.
     """
@@ -223,7 +223,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 
 
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
-    """How far the output leaves the line through its surroundings at samples [first, last) and soon after.
+    """Largest distance of the output from the line through its surroundings at samples [first, last) and soon after.
 
     `follows`: the motion of the output expected without the pulse, which does not count as a response.
     """
@@ -365,7 +365,7 @@ NOISE_FREE = 1e-9
 
 
 def sensitivity(y: Array, v: Array) -> float:
-    """Robust sensitivity: the interquartile range of the output over that of the drive."""
+    """Robust sensitivity: the interquartile range of the output divided by that of the drive."""
     spread = float(np.subtract(*np.quantile(v, (0.75, 0.25))))
     return float(np.subtract(*np.quantile(y, (0.75, 0.25)))) / spread if spread > 0.0 else 0.0
 

@@ -35,8 +35,8 @@ HELD_OUT = 0.25
 class Fit:
     """A fitted model and its quality.
 
-    `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: what the user should know, one sentence
-    each; `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
+    `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: for the user, one sentence each;
+    `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
     `history`: drive values visited before each record, None if unknown; `records`: the records of `used`, in that
     order; `draw`: makes the figure of `plot`, None if there is nothing to draw.
     """
@@ -153,7 +153,7 @@ class Fit:
         return dump_parameters(self.parameters, comments, "\n".join(lines))
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the parameter file, all or nothing."""
+        """Write the parameter file completely or not at all."""
         write_atomically(path, self.text())
 
     def _interval_sentence(self) -> str:

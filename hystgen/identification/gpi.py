@@ -75,8 +75,8 @@ class FittedModel:
 def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, list[Course]]:
     """Fit a model of one kind; also returns the courses as they were compared, with the measured drive.
 
-    Of several fronts of a kind, the one chosen has the fewest shape parameters among those whose error on blocks left
-    out of the fit is close to the smallest. Raises IdentificationError.
+    Among the fronts of a kind whose error on blocks left out of the fit is close to the smallest, the front with the
+    fewest shape parameters is chosen. Raises IdentificationError.
     """
     return _solved(courses, kind, how, lambda found: [_by_blocks(found)])[0]
 
@@ -205,7 +205,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
     with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
     lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output enters the
-    plays, so its solution is only a starting point for the fit of the output. None if no sample is left.
+    plays, so its solution is only a starting point for the fit of the output. None if no sample remains.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])

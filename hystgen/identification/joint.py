@@ -385,7 +385,7 @@ class LocalFit:
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input in place of the drive and of the history."""
+    """The course as the plays see it: their input replaces the drive and the history."""
     if not stages:
         return item
     rising, visited = _session(item, stages)
@@ -477,7 +477,8 @@ def search(
 
 
 def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
-    """A solution of a linear system, rounded to what the records determine; `sizes`: lengths of the system's columns.
+    """A solution of a linear system, rounded to the digits that the records determine; `sizes`: lengths of the system's
+    columns.
 
     The rounding units are powers of two, at most `most`. The last bits from linear algebra libraries differ between
     processors; carried from step to step, they could lead a search to another minimum. With rounding, its steps are the

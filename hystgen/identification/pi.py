@@ -47,8 +47,8 @@ class IdentificationError(ValueError):
 class Sense:
     """How the output moves with the drive.
 
-    `falls`: the output goes down when the drive goes up; `clockwise`: loops run in the opposite direction to those of
-    plays, and weights of either sign explain the records clearly better than positive ones.
+    `falls`: the output goes down when the drive goes up; `clockwise`: loops run in the opposite direction to a play's
+    loops, and weights of either sign explain the records clearly better than positive weights.
     """
 
     falls: bool
@@ -517,7 +517,7 @@ def residual(system: Array, columns: Columns, weights: Array) -> float:
 class Weights:
     """Result of `fit_weights`: the weights, their rms error, and whether p_0 was raised.
 
-    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None if it was not.
+    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None if it was not raised.
     """
 
     p: Array

@@ -79,8 +79,8 @@ def samples_in(record: Record, seconds: float) -> int:
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it enters a fit: without the start where the memory is unknown; isolated faults that need no model
-    to be found are bridged (drive) or left out (output).
+    """The record as it enters a fit: without the start where the memory is unknown, and with isolated faults that can
+    be found without a model bridged (drive) or left out (output).
 
     Raises IdentificationError for a record that a fit cannot use.
     """

@@ -44,8 +44,8 @@ class StartMemory:
     """A start memory found by a fit (`start`).
 
     `turns`: drive values that bring virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units; `once`: threshold of a play that leaves this memory
-    but is so wide that it hardly moves back in the record, None if there is none.
+    contribution to the output at the first sample, output units; `once`: threshold of a play that has moved away from
+    this memory but is too wide to move back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]

@@ -24,8 +24,8 @@ class Settings:
     """Settings of an older parameter file.
 
     `values`: its values for `KEPT_KEYS`; `name` and `units`: used if the user gives none, and records are converted to
-    these units; `effects`: names of its effects, which are dropped along with its weights; `problem`: why nothing could
-    be read.
+    these units; `effects`: names of its effects, which are dropped along with its weights; `problem`: the reason why
+    the file could not be read.
     """
 
     file: str = ""

@@ -6,8 +6,8 @@ adds the constant `p_i s_i` to the output; after that it no longer depends on th
 piecewise linear in the `d` of every record, which join the weights as further bounded unknowns (the search is in
 `joint`). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
 
-The result is a course's `StartMemory`: drive values that would have left that memory. Like a known history, they have
-the same meaning with any front and any thresholds.
+The result is a course's `StartMemory`: drive values that would have produced that memory. Like a known history, they
+have the same meaning with any front and any thresholds.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 STARTS, UNLIKE = 8, 3.0
-"""Minimum number of samples of a start, and the ratio of its rms error to that of the rest above which the given or
+"""Minimum number of samples of a start, and the ratio of its rms error to the error elsewhere above which the given or
 estimated memory is taken to be wrong."""
 
 ROUNDING = 1e-6
@@ -65,7 +65,7 @@ ROUNDS = 2
 def estimated(
     courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None
 ) -> list[Course]:
-    """The courses compared from their beginning, with a start memory for those with an unknown history.
+    """The courses compared from their beginning, with a start memory for each course with an unknown history.
 
     `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
     of that option. The start of a course stays ignored if its errors are far larger than those after it (a transient),
@@ -104,7 +104,7 @@ def needed(
     """The courses, with a start memory (`estimated`) for each course with too few comparable samples otherwise.
 
     `least`: fraction of a course's samples that is enough; `largest`: threshold above which plays hardly move; their
-    memory is ignored if waiting for it would leave too little to compare and no start memory is found.
+    memory is ignored if waiting for it would leave too few samples to compare and no start memory is found.
     """
     known = [_enough(item, least, largest) for item in courses]
     short = [lacking(item, least) for item in courses]
@@ -229,7 +229,7 @@ def memory_of(slopes: Array, r: Array) -> Array:
 
 
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
-    """Drive values that leave virgin plays of thresholds r (n+1,) in an admissible memory (n+1,).
+    """Drive values that bring virgin plays of thresholds r (n+1,) to an admissible memory (n+1,).
 
     As a function of the threshold, the memory left by a history has slopes of -1 and 1 only: going inwards from the
     outermost play, a part that falls with the threshold comes from a turn at `s + r`, a part that rises from a turn at

@@ -43,7 +43,7 @@ class Waveform:
         """A straight move at `pace` samples per full-scale move, in `EDGE` samples or more, within the rate limit.
 
         Then the drive rests, so that two samples remain at the turning point even once corners are rounded: the turning
-        point is then sampled whatever fraction of a sample the output is delayed by.
+        point is then sampled even if the output is delayed by a fraction of a sample.
         """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)

@@ -231,7 +231,7 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
 
 
 LISTED = 20
-"""Columns or bad cells that are listed individually; the rest are only counted."""
+"""Number of columns or bad cells that are listed individually; the others are only counted."""
 
 STANDARD = ("t", "v", "y")
 
@@ -320,7 +320,7 @@ def meaning(c: Column) -> str:
 
 def _words(c: Column) -> set[str]:
     """Words of a column's name, in lower case."""
-    # In "Control Voltage of OutputChan1", only the words before "of" say what the quantity is
+    # In "Control Voltage of OutputChan1", only the words before "of" name the quantity
     quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
     words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
     # A capital T is a temperature more often than a time
@@ -357,7 +357,7 @@ def parse_columns(text: str) -> dict[str, str]:
 
 @dataclass
 class Finder:
-    """Finds the requested columns; `problems` lists what is wrong with those not found.
+    """Finds the requested columns; `problems` lists the reasons why the others were not found.
 
     `understood`: columns found by the meaning of their names, keyed by our names; `steps`: the file's sample rate for
     the columns found, if it has no time.

@@ -31,7 +31,7 @@ LONGEST = 1 << 10
 
 DEEPEST = 32
 """[levels] Nesting limit of groups, like that of structs in `mat_nesting`: 20,000 levels take minutes, since the path
-of each group contains all those above it."""
+of each group contains the names of all groups above it."""
 
 _MATLAB_OWN = ("#refs#", "#subsystem#")
 """Groups in which MATLAB keeps the contents of its cell arrays and objects."""

@@ -37,7 +37,7 @@ PIECE = 1 << 16
 
 
 def problem(stream: IO[bytes]) -> str:
-    """Why a file must not be passed to scipy, in words; empty if it is safe.
+    """The reason why a file must not be passed to scipy; empty if it is safe.
 
     An element that is truncated or not an array stops the walk; scipy stops there as well, with a message.
     """

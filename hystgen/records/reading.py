@@ -142,7 +142,7 @@ class Reading:
         line: int | None = None,
         steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The requested columns, keyed by our names. Raises RecordError for those that are missing.
+        """The requested columns, keyed by our names. Raises RecordError for missing columns.
 
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """

@@ -129,8 +129,8 @@ def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
 class UnitGoal(NamedTuple):
     """The target unit for the drive or the displacement of records.
 
-    `unit`: empty if the first record with a unit decides; `whose`: what messages call the quantity; `named`: given by
-    the user, who thereby declares what an unknown unit is; `told`: whether to report that a record has decided.
+    `unit`: empty if the first record with a unit decides; `whose`: the quantity's name in messages; `named`: given by
+    the user, who thereby declares the meaning of an unknown unit; `told`: whether to report that a record has decided.
     """
 
     unit: str = ""

@@ -25,7 +25,7 @@ def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
 
 
 def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: Sequence[ArrayLike]) -> None:
-    """Write `columns_text` to a file, all or nothing."""
+    """Write `columns_text` to a file, completely or not at all."""
     write_atomically(path, columns_text(header, arrays))
 
 

@@ -117,7 +117,7 @@ NOISE_FROM = {
     "differences": "the differences between neighbouring samples, since the records have no holds and no equal periods",
     "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
 }
-"""The source of the noise floor, in words."""
+"""The source of the noise floor, as text."""
 
 
 def _noise(result: Result) -> Text:

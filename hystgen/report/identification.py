@@ -85,7 +85,8 @@ def report_fit(
 def write(
     fit: Fit, records: Sequence[Record], folder: str | os.PathLike[str], parameter_file: str | None = None
 ) -> Path:
-    """Write report.html and every picture as SVG and PNG into a folder, all or nothing. Returns the page's path.
+    """Write report.html and every picture as SVG and PNG into a folder, either all files or none. Returns the page's
+    path.
 
     `records`: those of the fit, then the held-out ones. `parameter_file`: its name in the command for the next step.
     Raises PlotError without matplotlib, ValueError for records other than those of the fit, OSError.
@@ -115,7 +116,7 @@ def write(
 
 
 def _kind(fit: Fit) -> str:
-    """The kind of model in words."""
+    """A phrase for the kind of model."""
     plays = fit.parameters.model.pi.thresholds
     cascade = cascade_of(fit.parameters)
     count = counted(len(plays) - 1, "play")

@@ -36,7 +36,8 @@ class Plan(planning.PlannedDrives):
     """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; returns the paths.
+        """Write the CSV files and `plan.html`, which explains them, into a folder, either all files or none; returns
+        the paths.
 
         Raises PlotError without matplotlib, OSError.
         """

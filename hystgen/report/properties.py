@@ -1,4 +1,4 @@
-"""The properties of a model in words."""
+"""The properties of a model as text."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
 
 def _mains(frequency: float, width: float) -> float | str | None:
-    """The mains frequency that a line matches, or the harmonic in words; `width`: the line's uncertainty, Hz."""
+    """The mains frequency that a line matches, or the harmonic as text; `width`: the line's uncertainty, Hz."""
     for mains in MAINS:
         for n in MAINS_HARMONICS:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):

@@ -59,7 +59,7 @@ class Against:
 
 
 def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
-    """The usable records, None in place of the others, and the findings, at most one per record.
+    """The usable records, with None for each of the others, and the findings, at most one per record.
 
     Swapped columns are put right; a record in other units, or with the output of another record, is left out. Faulty
     samples do not affect these checks.
@@ -194,7 +194,8 @@ def _better(swapped: Against, found: Against) -> bool:
 
 
 def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
-    """The record whose prediction the output of record k follows instead of its own prediction, or None."""
+    """Another record whose prediction matches the output of record k, which does not match its own prediction, or
+    None."""
     if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
         return None
     y = np.asarray(records[k].y)
@@ -352,12 +353,12 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
     """The courses, with start memories if too few samples could be compared without, and notes on their loop
     directions.
 
-    Otherwise they get none, since the first seconds of an effect may look like a start memory. Fitted records are
-    judged one by one, since the fit needs each; held-out ones are judged together, since a memory found before the
-    effects are known may be wrong by as much as these contribute, an error that no effect then removes.
+    Otherwise no start memory is estimated, since it could absorb the first seconds of an effect. The need is judged for
+    each fitted record, since the fit needs all of them, but for all held-out records together: a memory found before
+    the effects are known may be wrong by the whole contribution of an effect, an error that no effect then removes.
     """
     low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
-    largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist, but hardly move
+    largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist but would hardly move
     begun = start.needed(to_fit, least=acceptance.FEW_COMPARED, largest=largest)
     solution, _ = pi.solve(begun, None, 0.0)
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held), largest)
@@ -382,7 +383,7 @@ def _least(courses: Sequence[Course]) -> float:
 
 
 def _without_faults(ready: Prepared) -> Prepared:
-    """The records without plainly faulty samples, unless hardly any samples would remain."""
+    """The records without plainly faulty samples, unless too few samples would remain."""
     repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
     items, wrong = without_faults([*ready.to_fit, *ready.held], repaired)
@@ -419,7 +420,7 @@ def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples left out only because their output was isolated."""
+    """Samples left out only as isolated samples of the output."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)

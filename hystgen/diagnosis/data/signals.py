@@ -108,7 +108,7 @@ def _holds(item: Item) -> list[tuple[float, int]]:
 
 
 def _rings(x: Array) -> bool:
-    """Whether a signal is mostly one oscillation that hardly decays: actuator ringing rather than noise.
+    """Whether a signal is mostly one lightly damped oscillation: actuator ringing rather than noise.
 
     The test is linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
     """

@@ -96,7 +96,7 @@ def _contender(ranked: Ranked, unit: str | None) -> Contender:
 
 
 def reason(refused: Refusal, unit: str | None) -> str:
-    """Why an effect is not named, in words."""
+    """The reason why an effect is not named, as text."""
     return REFUSALS[refused.why].format(value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else "")
 
 
@@ -136,7 +136,7 @@ REFUSALS = {
     "wild": "its inverse moves the output of the plain model by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
     "other": "another shape does better, or as well with fewer parameters",
 }
-"""Why an effect that was tried is not named, in words."""
+"""Reasons why an effect that was tried is not named, as text."""
 
 
 def _in_digits(value: object) -> object:

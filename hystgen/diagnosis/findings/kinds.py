@@ -16,7 +16,7 @@ INTERPOLATION = "the sensor's interpolation error looks like this"
 class Finding(ABC):
     """An entry of `unexplained`.
 
-    `kind`: its name in `diagnosis.json`; `optional`: keys that are left out there if they are None or False.
+    `kind`: its name in `diagnosis.json`; `optional`: keys omitted from that file if they are None or False.
     """
 
     kind: ClassVar[str]
@@ -75,7 +75,7 @@ class SwappedChannels(Fault):
 
 @dataclass(frozen=True)
 class ExchangedRecords(Finding):
-    """A record with the output of another one, which was left out."""
+    """A record that was left out because it has the output of another record."""
 
     kind = "exchanged_records"
     record: str
@@ -107,7 +107,7 @@ class Scale(Finding):
 
 @dataclass(frozen=True)
 class OtherHistory(Fault):
-    """A given history that the starts of the records contradict: rms errors of the starts and of the rest."""
+    """A given history that the starts of the records contradict: rms errors at the starts and elsewhere."""
 
     kind, noun, qualifier = "history", "history", " that the starts contradict"
     record: str
@@ -317,8 +317,8 @@ class WildInverse(Finding):
     """Effects that were found but are not written, since their inverse does more than the recordings support.
 
     `moves`: rms change that the inverse with them causes in the plain model's output, over recorded outputs; `other`:
-    the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: ratio of the second
-    differences of its drive to those of the plain inverse's drive.
+    the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: second differences of its
+    drive, divided by those of the plain inverse's drive.
     """
 
     kind = "wild_inverse"
@@ -438,7 +438,7 @@ noise supports. Only the wording depends on this. Changed by: report::test_ratio
 
 
 def times_noise(ratio: float) -> str:
-    """An error as a multiple of the noise, in words."""
+    """An error as a multiple of the noise, as text."""
     return f"{float(f'{ratio:.2g}'):g} times the noise" if ratio <= MANY else f"more than {MANY:g} times the noise"
 
 

@@ -50,7 +50,7 @@ NO_WIDER = {
     "firm": "its range is not widened",
     "noise": "only noise is left",
 }
-"""Why no wider range was tried, in words."""
+"""Reasons why no wider range was tried, as text."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ WRITTEN = {
     "given": "the model as given",
     "identified": "the model of `identify --model auto`",
 }
-"""The model in `params.yaml`, in words."""
+"""Descriptions of the model in `params.yaml`."""
 
 
 @dataclass(frozen=True)
@@ -390,7 +390,8 @@ class Diagnosis:
         return json.dumps(self.content, indent=2, allow_nan=False) + "\n"
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, all or nothing; returns the paths.
+        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, either all files or none; returns the
+        paths.
 
         Raises PlotError without matplotlib.
         """

@@ -32,8 +32,8 @@ estimated from only part of the samples, and may miss slow noise. Changed by: bl
 
 FAR_ABOVE_NOISE = 2.0
 """[times the noise floor] An error above this is not noise, whether or not it depends on a known variable; coloured
-noise stays below it. Records of only one loop support no name if more than this remains, since the right name with a
-wrong shape leaves as much error as a wrong name. Changed by: blind none, blind poor."""
+noise stays below it. Records of only one loop support no name if more than this remains, since the residual is as large
+for the right name with a wrong shape as for a wrong name. Changed by: blind none, blind poor."""
 
 STRUCTURE_SHARE = 0.15
 """[fraction of the error's variance] An error is structured if one variable explains more than this fraction of it on
@@ -133,36 +133,37 @@ EQUAL = 0.005
 acceptance::equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
-"""[fraction of the gap above the noise] Records of one loop support a name only if the effect leaves at most this
-fraction, and cannot separate several such effects: one curve up and one down hardly show which shape is right. Set by:
-180 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not
+"""[fraction of the gap above the noise] Records of one loop support a name only if at most this fraction remains with
+the effect, and cannot separate several such effects: one curve up and one down hardly show which shape is right. Set
+by: 180 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not
 recorded)."""
 
 LEAST_EXPLAINED = 0.5
-"""[fraction of the variance above the noise] Names stand only if together they leave at most this fraction of the
-held-out and of the fitted error, so that most is explained. Effects explain less of a disturbance: for room temperature
+"""[fraction of the variance above the noise] Names stand only if at most this fraction of the held-out and of the
+fitted error remains with them, so that most is explained. Effects explain less of a disturbance: for room temperature
 acting on the gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names
 left at most 0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by:
 acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
-"""[fraction of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names
-do: they must then explain two thirds. For room temperature acting on the gain, the wrong names ageing and self-heating
-left 0.39 to 0.41; right names left at most 0.30, where a second effect was missed. Set by: second_plants foreign
-300:308, single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
+"""[fraction of the variance above the noise] The same limit if the residual is above `MUCH_LEFT`, as with wrong names:
+they must then explain two thirds. For room temperature acting on the gain, the wrong names ageing and self-heating left
+0.39 to 0.41; right names left at most 0.30, where a second effect was missed. Set by: second_plants foreign 300:308,
+single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
-"""[times the noise floor] If the named effects leave more than this, the verdict begins with the remaining error; if,
-in addition, a parameter is at an end of its range and more than `END_LEAVES` remains, none is named. In 457 blind cases
+"""[times the noise floor] If the error with the named effects is above this, the verdict begins with that error; if, in
+addition, a parameter is at an end of its range and more than `END_LEAVES` remains, none is named. In 457 blind cases
 this happened for two disturbances by room temperature and for one pair. Set by (the latter): second_plants foreign
 11001, 11006, pair 8012, blind first 97000. Changed by: blind single, acceptance::what_a_verdict_says_first."""
 
 END_LEAVES = 0.105
 """[fraction of the gap above the noise, rms] If more than `MUCH_LEFT` remains and a parameter of an effect is at an end
-of its range, names stand only if they leave at most this fraction of the held-out and of the fitted error: nine tenths
-are then explained, to the whole per cent that the verdict states. A multiple of the noise alone says nothing about
-records with little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants
-foreign 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
+of its range, names stand only if at most this fraction of the held-out and of the fitted error remains with them: nine
+tenths are then explained, to the whole per cent that the verdict states. A multiple of the noise alone is no criterion
+for records with little noise. False names for room temperature acting on the gain left 0.62 and more. Set by:
+second_plants foreign 300:308, 11000:11020. Changed by:
+selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
 """[times the width of a range] How far a range is widened beyond an end that a parameter has reached, in search
@@ -235,7 +236,7 @@ starts with up to 3.5 (a limit of the output has no effect beyond the measured r
 
 IDLE = 0.01
 """[fraction of the error] A start that changes the error by less has no effect yet, and is left out if another start
-has one: next to a large effect, every start for a further one may be worse than none. Changed by: blind pair."""
+has one: next to a large effect, every start for a further effect may be worse than none. Changed by: blind pair."""
 
 KEPT = 5
 """[shapes] Number followed up after the screening: those with the smallest held-out errors. Changed by: blind
@@ -334,8 +335,8 @@ THIN_STEPS = 32
 acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
-"""[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
-and the drive by no more than it takes to move the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
+"""[times the noise] A stretch may be left out if the prediction over it deviates from a straight line by at most this,
+and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, a tenth as large because the plays remember it. Changed by:
@@ -355,9 +356,9 @@ output by no more than some tens of times the noise, so its sample has little we
 
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
 """[samples], [samples] The longest jump that is not resolved, from one sample to the next or with an averaged sample
-between, and the minimum number of samples for which the drive rests before and after it. With such samples, a lag, a
-delay or a rate dependence left 2 to 8 times the noise; without, 1.0 to 1.1. Set by: second_plants single 0:13, pair
-0:6."""
+between, and the minimum number of samples for which the drive rests before and after it. With such samples, the
+residual with a lag, a delay or a rate dependence was 2 to 8 times the noise; without, 1.0 to 1.1. Set by: second_plants
+single 0:13, pair 0:6."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 

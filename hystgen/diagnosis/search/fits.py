@@ -436,7 +436,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
     # only the parameters' part of the covariance is needed; its triangular root with a positive diagonal is unique,
-    # unlike singular vectors, whose signs and order depend on the library and would lead to other draws
+    # unlike singular vectors, whose signs and order depend on the library and would change the draws
     root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
     root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)

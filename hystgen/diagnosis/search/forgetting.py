@@ -80,7 +80,7 @@ class Forgetting(Effect):
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     """The element, if the records support it in addition to the effects found or instead of them; else None.
 
-    The element is first tried in place of all effects of the `outcome`, then of those that depend on time, then in
+    The element first replaces all effects of the `outcome`, then only those that depend on time; then it is tried in
     addition to all. Effects that explain more are kept. If the difference may be chance, the effects are kept if the
     drive covers equal distances in different times, since effects of time and of travel then differ.
     """

@@ -97,7 +97,7 @@ def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
 
 
 def _smooth(y: Array) -> Array:
-    """Moving average over a few samples, applied twice, so that noise hardly shows in second differences."""
+    """Moving average over a few samples, applied twice, so that second differences contain little noise."""
     n = SMOOTHED
     kernel = np.ones(n) / n
     for _ in range(2):

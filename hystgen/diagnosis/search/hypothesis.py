@@ -75,8 +75,8 @@ class Actuator(Ordered):
         """Rows that the weights multiply, up to the output map, and the constant added to them.
 
         They hold only the compared samples if no later part needs the others; `compared` picks the compared ones in any
-        case. With `p`, a single row: the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums
-        shared by actuators with common effects.
+        case. With `p`, a single row: the weighted sum, which passes through the rest of the chain once. `sums`:
+        weighted sums shared by actuators with common effects.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -396,7 +396,7 @@ class Structure:
         return Actuator(self.thresholds, stages, tuple(self.effects(shape)), starts=self.starts)
 
     def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
-        """The actuators of a shape with one parameter at a time changed by `DIFFERENCE`; the rest is that of `here`."""
+        """The actuators of a shape with one parameter at a time changed by `DIFFERENCE`; the rest comes from `here`."""
         front, numbers = self.pieces(shape)
         ends = len(front) + np.cumsum([len(x) for x in numbers])
 

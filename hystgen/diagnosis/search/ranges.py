@@ -41,7 +41,8 @@ class End:
 
 
 def wider(now: Fitted, records: Records) -> Fitted | None:
-    """The hypothesis fitted with wider ranges for parameters at an end of theirs; None if the schema allows none."""
+    """The hypothesis fitted with wider ranges for parameters at an end of theirs; None if the schema allows no wider
+    range."""
     if not _parts_at_an_end(now):
         return None
     numbers, thresholds = now.structure.pieces(now.shape)[1], tuple(now.structure.thresholds.tolist())

@@ -134,7 +134,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
     """`LIMIT` for a front that is linear between flatter ends, or bends in the same way at both ends; else `BEND`.
 
-    Both names if only one end is a little flatter: a soft limit there and a bent actuator give the same front.
+    Both names if only one end is slightly flatter: a soft limit at that end and a bent actuator give the same front.
     """
     v = np.linspace(*drive, SLOPE_PLACES)
     w = v
@@ -319,7 +319,7 @@ class _Trial(NamedTuple):
     shape: Array | None = None
     """start of the search; for a shape that contains a simpler one, the parameters of that one"""
     weights: Array | None = None
-    """weights close to those of the start"""
+    """weights close to the weights at the start"""
     steps: int = 0
     rms: float = math.nan
     """error at the start, if it is known"""

@@ -84,10 +84,10 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
 def judged(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | Refusal:
     """Merit of a tried effect, or why it has none.
 
-    It has none if chance explains the difference, if it removes too little to stand out from the noise, if it hardly
-    shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it is a limit
-    that acts only at the very end of the drive range, or if it does not level off within the records. However few
-    events show an effect, chance does not halve an error to which nothing was fitted.
+    An effect has no merit if chance explains the difference, if it removes too little to stand out from the noise, if
+    it hardly shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it
+    is a limit that acts only at the very end of the drive range, or if it does not level off within the records.
+    However few events show an effect, chance does not halve an error to which nothing was fitted.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -193,9 +193,10 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     effect). Or its held-out error is within a few per cent, and its fitted error is equal, larger by chance or, if a
     parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of the best is
     the largest that is tried, all candidates that are `alike` are about as good: so much creep can also follow a lag.
-    With equal numbers of parameters, the error over all records decides; if it hardly differs, the held-out error; then
-    `place`: a lag, which every amplifier has, before a delay. A small lead on held-out records, whose error may belong
-    mostly to a third effect, does not make a candidate the best if its fitted error is far larger than another's.
+    With equal numbers of parameters, the error over all records decides; if these errors are nearly equal, the held-out
+    error decides; then `place`: a lag, which every amplifier has, before a delay. A small lead on held-out records,
+    whose error may belong mostly to a third effect, does not make a candidate the best if its fitted error is far
+    larger than another's.
     """
     if not tried:
         return []
@@ -274,9 +275,9 @@ def _everywhere(each: Tried, best: Tried, records: Records) -> float:
 
 
 def alike(other: Tried, best: Tried, noise: float) -> bool:
-    """Whether the records leave open which of two effects is present.
+    """Whether the records cannot decide which of two effects is present.
 
-    They do unless the advantage of one over the other is large enough to deserve a name and not due to chance.
+    They can decide if the advantage of one over the other is large enough to deserve a name and not due to chance.
     """
     if no_worse(other.held_out, best.held_out, noise):
         return True
@@ -524,7 +525,8 @@ def again(fitted: Fitted, ready: Prepared) -> Fitted:
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """The outcome with p_0 raised to the floor of `identify`, and the weights; its errors are those of this model."""
+    """The outcome, with the errors of the model with p_0 raised to the floor of `identify`, and that model's
+    weights."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
@@ -660,7 +662,7 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None if there is none to try.
+    """The best extension of a hypothesis and those it was chosen from; None if there is no extension to try.
 
     `start`: the same hypothesis with other parameters, from which extensions are searched for; `least`: as in
     `merit_of`. An extension may explain most only through its free start states and have no merit on equal terms; then
@@ -687,7 +689,8 @@ def _explained(step: _Step, records: Records) -> bool:
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
+    """The latest step with a rival instead of its best effect, and the step that follows from it; None to keep the
+    best.
 
     The next step shows which of several similar effects is present: the accepted one is wrong if no further effect
     qualifies after it but one does after a rival, if more error then remains, or if the same error takes more
@@ -729,7 +732,7 @@ def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) 
 
     An effect with many parameters also follows other effects, as a fast state of creep follows relaxing plays. Little
     remains for the other effect to explain, although the first follows it only roughly. The two are tried in the
-    opposite order if the accepted one leaves so much error that a verdict would begin with it.
+    opposite order if so much error remains with the accepted one that a verdict would begin with it.
     """
     left = records.residual(failed.now)
     if left <= acceptance.MUCH_LEFT * records.noise:
@@ -882,9 +885,9 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     error on equal terms, or an equal one with an earlier `place`.
 
     If the other has no more parameters and held-out errors hardly differ, the error over all records decides; between
-    two effects with equally many parameters, the order of `simplest_first`. Of two effects that the records do not
-    separate, the one with fewer parameters stands, since more parameters can follow another effect; of two shapes of
-    one effect, whose name is not in question, the one with the smaller error stands.
+    two effects with equally many parameters, the order of `simplest_first` decides. Of two effects that the records do
+    not separate, the one with fewer parameters stands, since more parameters can follow another effect; of two shapes
+    of one effect, whose name is not in question, the one with the smaller error stands.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -905,7 +908,7 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 
 
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
+    """The effects with a rival for the latest and another shape of an earlier one, if that is better.
 
     The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: each keeps
     the other in place, so that exchanging only one does not find the pair that belongs together.
