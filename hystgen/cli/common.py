@@ -84,7 +84,7 @@ def guarded(path: str, action: Callable[[], T]) -> T:
 
 
 def _reason(error: Exception) -> str:
-    """The text of an error; for operating system errors the file, the reason and what to do."""
+    """The text of an error; for operating system errors the file, the reason and advice."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror

@@ -65,8 +65,8 @@ def diagnose(
     for `identify` and converted to the model's units; `holdout`: records with other waveforms, by which models are
     judged; if none are given, or too few of their samples can be compared, every third record, or the end of each, is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
-    `rest`: pause after them in seconds. `skip`: seconds at the start of every record that are not compared, although
-    their drive still moves the plays. `effects`: further effects to try.
+    `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
+    although their drive still moves the plays. `effects`: further effects to try.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
     weights to the free-run error, and accepted if it removes a substantial part of the held-out error and the gain is
@@ -184,8 +184,8 @@ class _Case:
         return done, wrong
 
     def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
-        """The prepared records, a function that refits the nominal model to them and, if the model has a front, one
-        that refits it without the front."""
+        """The prepared records, a function that refits the nominal model to them and, if the model has a front, a
+        function that refits it without the front."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)

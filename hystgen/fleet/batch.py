@@ -53,10 +53,10 @@ COLUMNS = ("unit", "file", "status", "message", *FIGURES, "outlier", "outlier_in
 class Unit:
     """One row of the summary.
 
-    `name`: C identifier of the model; `file`: its record; `done`: whether it succeeded, otherwise `message` describes
-    the failure in one line; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from the rest,
-    and by how much; empty if there are none; `sha256`: hash of records, options, settings and tool version; `kept`:
-    whether an earlier call did the work; `settings`: keys kept from the existing parameter file.
+    `name`: C identifier of the model; `file`: the unit's record; `done`: whether it succeeded, otherwise `message`
+    describes the failure in one line; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from
+    the rest, and by how much; empty if there are none; `sha256`: hash of records, options, settings and tool version;
+    `kept`: whether an earlier call did the work; `settings`: keys kept from the existing parameter file.
     """
 
     name: str
@@ -123,7 +123,7 @@ class Fleet:
 
 @dataclass(frozen=True)
 class _Job:
-    """The task for a unit; `key`: hash of everything that its outputs depend on."""
+    """The task for a unit; `key`: hash of everything that the unit's outputs depend on."""
 
     unit: str
     file: str

@@ -41,7 +41,7 @@ IDLE = 30.0
 """[s] Time after which an idle process ends."""
 
 WATCH = 1.0
-"""[s] Interval at which a process checks that its parent is still there."""
+"""[s] Interval at which a process checks that its parent is still alive."""
 
 
 class SchedulerError(OSError):

@@ -48,7 +48,7 @@ MOST_OUTLIERS = 0.01
 """Largest fraction of samples that may be rejected as outliers; if more lie far out, they are not outliers."""
 
 FEW = 2
-"""Number of samples that may be rejected in a record of any length: its first and its last one."""
+"""Number of samples that may be rejected in a record of any length: the first and the last."""
 
 LONG_GAP = 25.0
 """[median steps] In a gap longer than this, the drive, and with it the memory, counts as unknown."""
@@ -69,8 +69,8 @@ def most(samples: int) -> int:
 def outliers(error: Array, v: Array, swing: float) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is never flagged.
 
-    `swing`: peak-to-peak output; errors far below it do no harm. Samples at a step of the drive `v` (N,) do not count,
-    since a model without a lag or a resonance misses them.
+    `swing`: peak-to-peak output; errors far below `swing` do no harm. Samples at a step of the drive `v` (N,) do not
+    count, which a model without a lag or a resonance does not predict.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)

@@ -213,12 +213,13 @@ Indices = NDArray[np.intp]
 class Used:
     """How a fit used one record; arrays are ascending indices into its samples.
 
-    `name`: the record's name; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
-    last sample (exclusive) of each part that was run, a single part if there is no gap; `starts`: the start memory
-    found for each part, None if it was given or not found; `skipped`: excluded at the start on request; `ignored`: not
-    compared at the start of a part because its start memory is unknown; `outliers`: isolated samples of y not compared;
-    `stretches`: samples of y not compared in drop-outs, held runs or converter saturation; `bridged`: samples of v
-    replaced by a straight line; `gaps`: first sample after each; `left_out`: parts between gaps too short to use.
+    `name`: the record's name; `held_out`: whether the record took no part in the fit; `samples`: its length; `parts`:
+    first and last sample (exclusive) of each part that was simulated, a single part if there is no gap; `starts`: the
+    start memory found for each part, None if it was given or not found; `skipped`: samples excluded at the start on
+    request; `ignored`: samples not compared at the start of a part because its start memory is unknown; `outliers`:
+    isolated samples of y not compared; `stretches`: samples of y not compared in drop-outs, held runs or converter
+    saturation; `bridged`: samples of v replaced by a straight line; `gaps`: first sample after each; `left_out`: parts
+    between gaps too short to use.
     """
 
     name: str

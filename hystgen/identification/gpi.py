@@ -27,7 +27,7 @@ KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be fitted; `auto` chooses among them."""
 
 BREAK_COUNTS = (1, 2, 4, 8)
-"""Numbers of breaks of a dead-zone sum that are tried."""
+"""Numbers of breaks tried for a dead-zone sum."""
 
 FRONT_PARSIMONY = 1.02
 """A front with fewer shape parameters is chosen if its validation error is within this factor of the best."""
@@ -84,9 +84,9 @@ def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, 
 def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[FittedModel, list[Course]]]:
     """The fits of one kind between which held-out records decide, the simplest first; otherwise the same as `solve`.
 
-    There are several only for tanh envelopes, with one branch and with two: two branches form a loop of their own, as
-    wide for a small amplitude as for a large one. Records of a single amplitude, and blocks left out of them, do not
-    show whether their loop is of that kind.
+    Several fits are returned only for tanh envelopes, with one and with two branches: two branches form a loop of their
+    own, as wide for a small amplitude as for a large one. Records of a single amplitude, and blocks left out of them,
+    do not show whether their loop is of that kind.
     """
 
     def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
@@ -204,8 +204,8 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
 
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
     with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
-    lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output enters the
-    plays, so its solution is only a starting point for the fit of the output. None if no sample remains.
+    lies behind the plays). The problem is convex, but it minimises an error of the drive, and noise of the output
+    enters the plays, so its solution is only a starting point for the fit of the output. None if no sample remains.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])

@@ -57,7 +57,7 @@ class Front(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name in the fit table."""
+        """The front's name in the fit table."""
 
     @property
     def straight(self) -> Array:
@@ -340,7 +340,7 @@ DAMPING = 1e-3
 ENOUGH = 0.005
 """[mean square error] The search ends when a step lowers the sum of squared errors by less than this.
 
-Moving an estimate by one of its standard deviations changes the sum by one mean square error.
+Moving an estimate by one standard deviation changes the sum by one mean square error.
 """
 
 LEAST_CHANGE = 1e-8

@@ -166,7 +166,7 @@ LEVELS = 32
 
 SIGMAS = 4.0
 """[standard deviations] Loops have a direction if their width differs from zero by more than this: none of 60 straight
-lines and saturating curves with noise does. Set by: tests/test_start.py TestDirection."""
+lines and saturating curves with noise exceeds it. Set by: tests/test_start.py TestDirection."""
 
 ONE_WAY = 0.5
 """[fraction of the area between the legs] Smallest net area of loops that have a direction: the wings of a butterfly
@@ -335,9 +335,9 @@ LEAST_VISIBLE = 0.05
 """The same fraction for a play that only just moves visibly, at the ends of the range.
 
 The diagnosis fits plays up to this limit, since otherwise the movement of wider plays could be mistaken for an effect.
-So does a fit to records with an unknown start that show such a play: without it, the held-out error was 1.4 to 1.6
-times that with a known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to
-39); with it, 1.2.
+A fit to records with an unknown start does the same if they show such a play: in one of ten plants whose drive grew in
+both directions, the held-out error without it was 1.4 to 1.6 times the error with a known start; with it, 1.2 times
+(`benchmarks/start_memory.py`, seeds 20 to 39).
 """
 
 COUNTS = (6, 8, 12, 16, 24)
@@ -529,11 +529,11 @@ class Weights:
 def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
     """Weights for the chosen plays, with p_0 at least the fraction `floor` of their sum if the data allow it.
 
-    p_0 is the slope just after a reversal, and the inverse divides by it. A record shows that slope only over the
-    first, smallest travel after a reversal, where even a slight lag of sensor or amplifier flattens the loop and drives
-    the least-squares p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. That
-    result is used if the rms error grows by at most 5 %, since the data then hardly determine p_0. Otherwise the
-    smaller p_0 belongs to the actuator (series backlash for p_0 = 0: no inverse) and is kept.
+    The inverse divides by p_0, the slope just after a reversal. A record shows that slope only over the first, smallest
+    travel after a reversal, where even a slight lag of sensor or amplifier flattens the loop and drives the
+    least-squares p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. The result
+    is used if the rms error grows by at most 5 %, since the data then hardly determine p_0. Otherwise the smaller p_0
+    is a property of the actuator (series backlash for p_0 = 0: no inverse) and is kept.
     """
     matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
 

@@ -166,7 +166,7 @@ def intervals(
 ) -> Intervals:
     """Intervals of a fit to `courses` (drive as measured) with residuals `errors`; `held`: errors of held-out records.
 
-    The residuals of a hysteresis model are coloured: model errors recur at every reversal. They are therefore not
+    The residuals of a hysteresis model are coloured: model errors recur at every reversal. Residuals are therefore not
     redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
     score `X_b^T e_b`; random signs of all scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
     Association 105, 2010, 218-235) redraw the record, and the weights of each redraw are found under the constraints of

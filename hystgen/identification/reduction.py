@@ -1,9 +1,9 @@
 """Reduce records to a small triangular system that contains everything a fit needs, whatever the number of samples.
 
-The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are computed for a few thousand
-samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
-2012, A206-A239), so that memory use does not grow with samples times thresholds. The column of ones comes first: the
-rows below the first are then the system with the offset projected out exactly.
+The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. The plays are computed for a few
+thousand samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci.
+Comput. 34, 2012, A206-A239), so that memory use does not grow with samples times thresholds. The column of ones comes
+first: the rows below the first are then the system with the offset projected out exactly.
 
 As long as the same plays follow the drive, each of them is the drive plus a constant, and the others do not move, so
 all plays are linear in the drive. However many samples such a segment has, two rows contain all information for least
@@ -43,9 +43,9 @@ FOLDS = 4
 class StartMemory:
     """A start memory found by a fit (`start`).
 
-    `turns`: drive values that bring virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units; `once`: threshold of a play that has moved away from
-    this memory but is too wide to move back in the record, None if there is none.
+    `turns`: drive values that bring virgin plays to it; `uncertainty`: half the width of the 95 % interval of the
+    memory's contribution to the output at the first sample, output units; `once`: threshold of a play that has moved
+    away from this memory but is too wide to move back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]
@@ -110,8 +110,8 @@ class Course:
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:
     """Play states just before the first sample.
 
-    With a history: virgin plays (state 0, as in `simulate`) after that history. Without one: plays at rest at the first
-    drive value, which is wrong by an unknown amount until the memory has been wiped.
+    With a history: virgin plays (state 0, as in `simulate`) after that history. Without a history: plays at rest at the
+    first drive value, which is wrong by an unknown amount until the memory has been wiped.
     """
     if history is None:
         return np.full(len(thresholds), v[0])

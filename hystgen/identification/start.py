@@ -38,8 +38,8 @@ ROUNDING = 1e-6
 
 LEAST_KNOWN = 0.5
 """If the memory is known for at least this fraction of a record's samples, the earlier samples are left out: a start
-memory fitted to them would flatter the model being judged. This rejects none of 56 simulated records without a history,
-and the median held-out error is 1.00 times that with the true history; with 0.25 it is 1.02 times."""
+memory fitted to them would flatter the model being judged. With 0.5, none of 56 simulated records without a history is
+rejected, and the median held-out error is 1.00 times that with the true history; with 0.25, it is 1.02 times."""
 
 PLAYS = 12
 """Number of thresholds for which start memories are estimated: the middle one of the numbers of plays that fits try by
@@ -59,7 +59,7 @@ TOGETHER = 6
 """Maximum number of courses that share weights in a search, whose cost grows with the cube of their number."""
 
 ROUNDS = 2
-"""Number of searches; the errors of the first one set the weight of the prior in the next."""
+"""Number of searches; the errors of the first search set the weight of the prior in the next."""
 
 
 def estimated(
@@ -172,9 +172,9 @@ def _started(
 ) -> list[Course]:
     """The courses with the start memories that were found, except for transients.
 
-    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. It represents all
-    plays that the drive moves only once, on its way beyond its earlier range: an actuator that came from a wider range
-    has such plays.
+    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. The added play
+    represents all plays that the drive moves only once, on its way beyond its earlier range: an actuator that came from
+    a wider range has such plays.
     """
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search.of(inner, r, weights)
@@ -213,7 +213,7 @@ def in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, 
 
 
 def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
-    """Whether the errors of a model before the memory is known are far larger than those after that."""
+    """Whether the errors of a model before the memory is known are far larger than afterwards."""
     known = np.isfinite(item.y)
     if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False

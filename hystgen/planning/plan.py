@@ -38,7 +38,7 @@ MEASURED = "measured"
 """Folder for the measured records, next to the drives."""
 
 WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
-"""Files of a session at one rate: its drives, its codes, and where its recording is expected."""
+"""Files of a session at one rate: drives, codes, and the expected path of the recording."""
 
 MOST_SAMPLES = 10_000_000
 """Maximum number of samples in a session at one rate: about 500 MB of text."""

@@ -82,7 +82,7 @@ class Session:
         return cls(**{**given, "records": parts})
 
     def cut(self, recording: Record) -> tuple[list[Record], list[Record]]:
-        """The records to fit, and the held-out ones, from a recording of the whole session.
+        """The records to fit and the held-out records, cut from a recording of the whole session.
 
         The recording has its own clock, sample rate and start; it is aligned where the drive first rises through the
         middle, which is before the first record. Raises PlanError if it does not fit the session.

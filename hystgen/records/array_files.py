@@ -27,7 +27,7 @@ TOGETHER = 1 << 20
 """Samples of a .mat file loaded at a time; short vectors are loaded together up to this number."""
 
 MOST_TOGETHER = 1000
-"""Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested one."""
+"""Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested name."""
 
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:

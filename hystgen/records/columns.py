@@ -160,8 +160,8 @@ _LINE = re.compile(
 class Step:
     """The time between two samples in `seconds`, and how the file states it (`said`).
 
-    `of`: the column it belongs to, or the group or struct including its separator; empty for the whole file; `start`:
-    time of the first sample, if the file gives one per column.
+    `of`: the column that the step belongs to, or the group or struct including its separator; empty for the whole file;
+    `start`: time of the first sample, if the file gives a start time per column.
     """
 
     seconds: float
@@ -271,9 +271,9 @@ _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 class Column:
     """A column of the file; its name need not be unique.
 
-    `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without
-    its unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`:
-    returns its numbers as a one-dimensional array that the caller owns; `also`: another name that the file gives it.
+    `name`: the full name, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without its
+    unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns
+    the numbers as a one-dimensional array that the caller owns; `also`: another name of the column in the file.
     """
 
     name: str
@@ -329,7 +329,7 @@ def _words(c: Column) -> set[str]:
 
 def parse_columns(text: str) -> dict[str, str]:
     """Mapping of our names to a file's: `t=Time,v=U,y=Pos`, or columns by number, starting at 1: `1,2,3` for t, v, y
-    and `1,2` for v, y, which become `#1` and so on. Raises ValueError saying what is wrong with it."""
+    and `1,2` for v, y, which become `#1` and so on. Raises ValueError with the problem."""
     numbers = [part.strip() for part in text.split(",")]
     if all(part.isdecimal() for part in numbers):
         if len(numbers) not in (2, 3):
@@ -410,7 +410,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """Report columns that are used for two needed ones."""
+        """Report columns that are used for two needed columns."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue
@@ -537,7 +537,7 @@ class Finder:
 
 
 def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, Column]:
-    """The other columns, each under its shortest unique name; those without one are omitted."""
+    """The other columns, each under its shortest unique name; columns without such a name are omitted."""
     names: dict[str, Column] = {}
     times = [Counter(getattr(c, part) for c in others) for part in ("label", "own", "name")]
     for c in others:

@@ -324,7 +324,8 @@ class _Body:
         return reading.finished(numbers, taken, self.lines)
 
     def _join_segments(self) -> None:
-        """Put the rows of all segments on a common time axis. Raises RecordError if one begins before another ends."""
+        """Put the rows of all segments on a common time axis. Raises RecordError if a segment begins before another
+        ends."""
         layout = self.layout.segments
         if layout is None:
             return
@@ -418,7 +419,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Read line by line: reports wrong cells with their positions, and accepts missing ones."""
+        """Read line by line: reports wrong cells with their positions, and accepts missing cells."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []

@@ -1,7 +1,7 @@
 """HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
 
 A record is one file: datasets behind external links, with external storage, or assembled from others (virtual) are not
-read, since that would open any file that this one names.
+read, since that would open any file named in this file.
 """
 
 from __future__ import annotations

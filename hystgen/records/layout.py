@@ -39,7 +39,7 @@ class TableLayout:
 
     `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
     rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
-    `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text that would begin
+    `clocks`: columns of times of day; `rows`: number of rows stated in the file; `another`: text that would begin
     another table; `segments`: further headers among the rows, after which the table continues.
     """
 
@@ -421,8 +421,8 @@ class Segments:
     """Segments after the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
 
     By NI's specification, times are seconds since the date and time of the segment if `Time_Pref` is `Relative`, and
-    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: those
-    of the first segment.
+    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: names
+    and tags of the first segment.
     """
 
     reading: Reading

@@ -196,9 +196,9 @@ class Reading:
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
-        It reads the requested columns and, from the groups that hold them, all others of the same length, except those
-        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: shapes
-        and readers by name; in a file without vectors, a single matrix is the record.
+        The table has the requested columns and, from the groups that hold them, all others of the same length, except
+        those that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`:
+        shapes and readers by name; in a file without vectors, a single matrix is the record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
@@ -324,7 +324,7 @@ def repaired(reading: Reading, table: Table) -> Record:
         keep = _rising(reading, table, columns["t"], keep)
     samples = int(np.count_nonzero(keep))
     if samples < length:
-        # One at a time, so that only one column exists twice
+        # One column at a time, so that only one of them exists twice
         for name in columns:
             columns[name] = columns[name][keep]
     fit = "y" in reading.need
@@ -379,7 +379,7 @@ def _repeats(t: Array) -> bool:
 
 
 def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> Array:
-    """Replace repeated times by times at the given sample time, unless the repeated ones contradict it."""
+    """Replace repeated times by times at the given sample time, unless the repeated times contradict it."""
     rows = np.flatnonzero(keep)
     steps = np.diff(t[rows])
     finest = float(np.min(steps[steps > 0.0]))

@@ -218,7 +218,7 @@ def _named(column: str, unit: str) -> str:
 
 
 def _apart(column: str, own: str, goal: UnitGoal, option: str) -> str:
-    """The message saying that a column cannot be converted to the target unit, and what to do about it."""
+    """The message saying that a column cannot be converted to the target unit, and advice."""
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]
     if not strange:

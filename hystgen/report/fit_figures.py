@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS, FEWEST = 40, 5
-"""Number of bins of the residual's mean, and the fewest samples in a bin that is drawn."""
+"""Number of bins for the residual's mean, and minimum number of samples in a bin that is drawn."""
 
 TAIL, FAR = 0.002, 3.0
 """[quantiles, times] An axis ends at these quantiles if the extremes are this many times farther out."""
@@ -112,7 +112,7 @@ def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
 
 
 def drawn_ones(shown: Sequence[Shown]) -> list[Shown]:
-    """The record with the largest error among the fitted ones and among the held-out ones."""
+    """The fitted record and the held-out record with the largest error."""
     groups = [[each for each in shown if each.used.held_out == held] for held in (False, True)]
     return [max(group, key=lambda each: each.rms) for group in groups if group]
 
@@ -340,7 +340,7 @@ def judged(shown: Sequence[Shown]) -> list[Shown]:
 
 
 def noise_of(shown: Sequence[Shown]) -> float | None:
-    """The largest noise of the records; None if it is unknown for any of them."""
+    """The largest noise of the records; None if it is unknown for any record."""
     found = [each.noise for each in shown]
     known = [sigma for sigma in found if sigma is not None]
     return max(known) if known and len(known) == len(found) else None

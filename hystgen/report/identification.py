@@ -88,7 +88,7 @@ def write(
     """Write report.html and every picture as SVG and PNG into a folder, either all files or none. Returns the page's
     path.
 
-    `records`: those of the fit, then the held-out ones. `parameter_file`: its name in the command for the next step.
+    `records`: the fitted records, then the held-out ones. `parameter_file`: name used in the command for the next step.
     Raises PlotError without matplotlib, ValueError for records other than those of the fit, OSError.
     """
     check_folder(folder)

@@ -112,7 +112,7 @@ def _steps(plan: Plan, home: str) -> list[str]:
 
 
 def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
-    """What to do with a session at one rate."""
+    """Instructions for a session at one rate."""
     session, samples = plan.session, plan.session.samples if plan.session else 0
     assert session is not None
     said = [

@@ -180,9 +180,9 @@ FINER = 4
 class _Motion:
     """The motion of a record at the compared samples, selected by `at`.
 
-    `places`: predicted positions; `errors`: the errors there; `moves`: change of the prediction since the previous
-    sample, NaN during holds, which only repeat a position that the model was fitted to. Positions are predicted because
-    a ripple that is large relative to its pitch is not sinusoidal over the measured position.
+    `places`: predicted positions; `errors`: the errors at these positions; `moves`: change of the prediction since the
+    previous sample, NaN during holds, which only repeat a position that the model was fitted to. Positions are
+    predicted because a ripple that is large relative to its pitch is not sinusoidal over the measured position.
     """
 
     at: NDArray[np.bool_]

@@ -69,10 +69,10 @@ class Recent:
 class Item:
     """A record to compare: `y` is NaN at samples left out; `history`: drive values before the record, None if unknown.
 
-    `timed`: whether its times are known. `turns`: drive values that bring virgin plays to the start memory found
-    without a history, if any. `session`: all records of the session on one time axis, if they form one; `part`: this
-    record's samples in it. Three caches: `moved`, movements of the plays, which most parameters of a search leave
-    unchanged; `residuals`, errors before the free offsets are fitted; `errors`, errors after that.
+    `timed`: whether the record's times are known. `turns`: drive values that bring virgin plays to the start memory
+    found without a history, if any. `session`: all records on one time axis, if they form a session; `part`: this
+    record's samples in the session. Three caches: `moved`, movements of the plays, which most parameters of a search
+    leave unchanged; `residuals`, errors before the free offsets are fitted; `errors`, errors with fitted offsets.
     """
 
     name: str
@@ -223,7 +223,7 @@ def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequenc
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:
         return [list(group) for group in groups]
-    kept: dict[int, Mask] = {}  # by run, since two items may be parts of one record
+    kept: dict[int, Mask] = {}  # by run, since two items may be parts of the same record
     for group, step, needs in zip(groups, every, masks, strict=True):
         for item, mask in zip(group, needs, strict=True):
             keep = mask.copy()

@@ -219,8 +219,8 @@ def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | No
 def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherHistory | None:
     """A finding if a model fitted with the history matches the starts only at the expense of the other samples.
 
-    `free`: the model fitted only to samples that do not depend on the history; it predicts the starts correctly. Errors
-    at the starts that do not affect the other samples may come from an effect that fades.
+    `free`: the model fitted only to samples that do not depend on the history, which predicts the starts correctly.
+    Errors at the starts that do not affect the other samples may come from an effect that fades.
     """
     starts, rest = _parts(items, free, True)
     _, bent = _parts(items, fitted, True)
@@ -228,7 +228,7 @@ def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherH
 
 
 def _parts(items: Sequence[Item], fitted: FittedLike, own: bool) -> tuple[list[Array], list[Array]]:
-    """Errors before and after the drive has wiped out the history; `own`: minus the mean of the errors after it."""
+    """Errors before and after the drive has wiped out the history; `own`: minus the mean of the later errors."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
         if item.history is None:
@@ -374,8 +374,8 @@ def _reach(courses: Sequence[Course]) -> float:
 
 
 def _least(courses: Sequence[Course]) -> float:
-    """Fraction of a held-out record's samples below which a start memory is estimated for it; 0 if enough samples of
-    all held-out records together can be compared without one."""
+    """Fraction of a held-out record's samples below which its start memory is estimated; 0 if enough samples of all
+    held-out records together can be compared without one."""
     known = [int(np.count_nonzero(np.isfinite(course.y[course.begin : course.last]))) for course in courses]
     used = [start.unknown(course).used for course in courses]
     able = max(used, default=0) > acceptance.COMPARED_SAMPLES
@@ -544,7 +544,7 @@ Runs = Sequence[tuple[int, int]]
 def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
     """The items without faulty samples, and findings about the faults; `repaired`: findings so far.
 
-    A level that marks a drop-out or the converter's limit in one record does so in all others.
+    A level that marks a drop-out or the converter's limit in one record marks it in all others.
     """
     ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
     dropped = [faults.drop_outs(item.y, item.run.v) for item in items]

@@ -23,7 +23,8 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise rms in output units from each method that the records allow; `rms`: the value used; `ruled`: its method.
+    """Noise rms in output units from each method that the records allow; `rms`: the value used; `ruled`: the method
+    used.
 
     Holds show all noise that is fast compared with their length; repeated periods show everything that does not repeat;
     differences show only changes from sample to sample, a lower bound if the noise is coloured. The noise is at least
@@ -269,7 +270,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
     for k, beside, share in narrow:
-        # a line of the drive itself, which may be a weak one among many harmonics
+        # a line of the drive itself, perhaps a weak one among many harmonics
         own = float(np.sum(drive[beside])) >= acceptance.DRIVE_LINE_SHARE * driven
         if own and drive[k] > acceptance.PEAK_HEIGHT * _around(drive, k, acceptance.SURROUNDINGS):
             continue

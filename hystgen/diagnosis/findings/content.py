@@ -243,9 +243,9 @@ MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
 """[fraction of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each
-about three times the previous one, from the smallest play up to five ranges. They explain 0.55 of a play model's
-residual variance on a Bouc-Wen plant; four lengths explain 0.34, eleven 0.59; for creep, they never explain more than
-0.09. Set by: benchmarks/chosen_numbers.py lengths."""
+about three times the previous one, from the smallest play up to five ranges. Six lengths explain 0.55 of a play model's
+residual variance on a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep, none of these explains more than 0.09.
+Set by: benchmarks/chosen_numbers.py lengths."""
 
 
 @dataclass(frozen=True)
@@ -435,7 +435,7 @@ def _regressed(x: Array, e: Array) -> float:
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Fraction of the error's variance that recurs when the drive repeats itself; None if the drive never does."""
+    """Fraction of the error's variance that recurs when the drive repeats itself; None if the drive does not repeat."""
     products = powers = 0.0
     count = 0
     for item, error in zip(items, errors, strict=True):

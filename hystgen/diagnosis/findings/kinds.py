@@ -16,7 +16,7 @@ INTERPOLATION = "the sensor's interpolation error looks like this"
 class Finding(ABC):
     """An entry of `unexplained`.
 
-    `kind`: its name in `diagnosis.json`; `optional`: keys omitted from that file if they are None or False.
+    `kind`: the finding's name in `diagnosis.json`; `optional`: keys omitted from that file if they are None or False.
     """
 
     kind: ClassVar[str]
@@ -52,7 +52,7 @@ class Fault(Finding):
 
     @property
     def times(self) -> int:
-        """How often it occurred: its `count`, or 1."""
+        """How often the fault occurred: its `count`, or 1."""
         return int(getattr(self, "count", 1))
 
 
@@ -129,7 +129,7 @@ class OtherHistory(Fault):
 
 @dataclass(frozen=True)
 class Saturated(Fault):
-    """Samples at a limit of the converter; `first`: time of the first one, s; `end`: `largest` or `least`."""
+    """Samples at a limit of the converter; `first`: time of the first such sample, s; `end`: `largest` or `least`."""
 
     kind, noun, qualifier = "saturated", "sample", " at the converter's limit"
     optional = frozenset(("first", "end", "level"))
@@ -146,7 +146,7 @@ class Saturated(Fault):
 
 @dataclass(frozen=True)
 class DropOuts(Fault):
-    """Stretches in which the output was lost; `level`: its value there, if it was constant."""
+    """Stretches in which the output was lost; `level`: value of the lost output, if constant."""
 
     kind, noun = "drop_outs", "drop-out"
     optional = frozenset(("level",))
@@ -211,7 +211,7 @@ class Line(Finding):
 
     @property
     def place(self) -> float:
-        """Its position on the frequency axis, Hz."""
+        """The line's position on the frequency axis, Hz."""
         return self.frequency
 
     def sentence(self, unit: str | None) -> str:
@@ -239,7 +239,7 @@ class Ripple(Finding):
 
     @property
     def place(self) -> float:
-        """Its position on the axis of pitches, output units."""
+        """The ripple's position on the axis of pitches, output units."""
         return self.pitch
 
     def sentence(self, unit: str | None) -> str:
@@ -257,7 +257,7 @@ Periodic = Line | Ripple
 
 @dataclass(frozen=True)
 class StickSlip(Finding):
-    """Jumps of the output after a standstill: their number, the time of the first one (s) and their median size."""
+    """Jumps of the output after a standstill: their number, the time of the first jump (s) and their median size."""
 
     kind = "stick_slip"
     record: str
@@ -316,9 +316,9 @@ class NotAPlaySum(Finding):
 class WildInverse(Finding):
     """Effects that were found but are not written, since their inverse does more than the recordings support.
 
-    `moves`: rms change that the inverse with them causes in the plain model's output, over recorded outputs; `other`:
-    the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: second differences of its
-    drive, divided by those of the plain inverse's drive.
+    `moves`: rms change that the inverse with the effects causes in the plain model's output, over recorded outputs;
+    `other`: the same with the two models exchanged; `gain`: held-out rms that the effects explain; `wilder`: second
+    differences of its drive, divided by those of the plain inverse's drive.
     """
 
     kind = "wild_inverse"
@@ -353,7 +353,7 @@ class Structured(Finding):
     `share_by_variable`: fractions of its variance that smooth functions of one variable explain on samples not used to
     fit them; `main_variable`: the variable with the largest fraction, None if none matters; `rate_free`, `repeatable`:
     None if the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive
-    and direction; `held_out_alone`: held-out records that show it although the fitted ones do not.
+    and direction; `held_out_alone`: held-out records that show the error although no fitted record does.
     """
 
     kind = "structure"
@@ -434,7 +434,8 @@ def several(names: Sequence[str]) -> str:
 
 MANY = 100.0
 """[times the noise] Larger ratios are not printed as numbers: they would need three digits, more than the estimated
-noise supports. Only the wording depends on this. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
+noise supports. Only the wording depends on this number. Changed by:
+report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:

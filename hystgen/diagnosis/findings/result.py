@@ -89,8 +89,8 @@ class AtEnd:
 class Withdrawn:
     """Effects that were accepted one by one but withdrawn in the end: the error with them, and the reason.
 
-    `before`, `after`: rms errors without and with them, on equal terms, output units; `left`: fractions of the gap
-    above the noise that remain, None if there is no gap.
+    `before`, `after`: rms errors without and with the effects, on equal terms, output units; `left`: fractions of the
+    gap above the noise that remain, None if there is no gap.
     """
 
     names: tuple[str, ...]
@@ -114,8 +114,8 @@ WRITTEN = {
 class NamedEffect:
     """An effect that was found: `parameters` as in a parameter file, with 95 % `intervals`.
 
-    `share_of_gap`: the held-out error that it removes, as a fraction of the refitted model's; errors in output units;
-    `at_an_end`: whether one of its parameters is at an end of its range, or two of its parts coincide, so that its
+    `share_of_gap`: the held-out error that the effect removes, as a fraction of the refitted model's; errors in output
+    units; `at_an_end`: whether a parameter is at an end of its range or two parts of the effect coincide, so that its
     shape is not certain; `ends`: the parameters at an end.
     """
 
@@ -143,7 +143,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A fully fitted shape of an effect, with its rms errors; `refused`: why it is not named, or None."""
+    """A fully fitted shape of an effect, with its rms errors; `refused`: why the effect is not named, or None."""
 
     name: str
     shape: str

@@ -1,6 +1,7 @@
 """Every number by which a diagnosis decides, with its unit, its reason, and the run that set it.
 
-The text below a number begins with its unit, in brackets, and says what happens on either side of it. It ends with
+The text below a number begins with its unit, in brackets, and says what happens on either side of the number. Each text
+ends with
 
 - `Set by`: the run that determined the number;
 - `Changed by`: the run or test that would reveal a wrong number, if no run that set it is recorded;
@@ -15,9 +16,9 @@ The runs:
 - acceptance::x: the row x of the table in `tests/test_acceptance.py`, whose answer changes when the number is doubled
   or halved; selection::test_x: a test of `tests/test_selection.py` that then fails.
 
-`docs/thresholds.csv` lists the rows for every number. Other modules read the numbers as attributes of this one, so that
-a test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
-modules that use them.
+`docs/thresholds.csv` lists the rows for every number. Other modules read the numbers as attributes of this module, so
+that a test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in
+the modules that use them.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
 
 
 def apart(more: float, less: float) -> float:
-    """rms by which an error exceeds a smaller one, if the excess is uncorrelated with it: sqrt(more^2 - less^2)."""
+    """rms by which an error exceeds a smaller one, if the excess is uncorrelated with the smaller one: sqrt(more^2 -
+    less^2)."""
     return math.sqrt(max(more**2 - less**2, 0.0))
 
 
@@ -197,7 +199,7 @@ MOST_EXCHANGES = 4
 forever. Changed by: run time of blind."""
 
 HELD_OUT_ALONE = 3.0
-"""[times the fitted error] A held-out record with a larger error shows something that no fitted record does. Changed
+"""[times the fitted error] A held-out record with a larger error shows something that no fitted record shows. Changed
 by: acceptance::held_out_records_that_are_alone."""
 
 # How far a search goes ---------------------------------------------------------------------------------------
@@ -404,8 +406,8 @@ is nonzero: if every other sample was held, half of them are. Changed by: accept
 
 LEAST_NOISE = 1e-5
 """[fraction of the output range] Every record is assumed to have at least this noise: 17 bits, more than sensors of a
-stage resolve in a single sample. Without it, records of a simulation would have a noise floor of 0, and any error would
-be far above it. Changed by: acceptance::records_without_noise."""
+stage resolve in a single sample. Otherwise, records of a simulation would have a noise floor of 0, and any error would
+be far above the noise. Changed by: acceptance::records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 

@@ -29,7 +29,8 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 POLISHED = 1e-5
-"""A search ends after a step that lowers the error by a smaller fraction, far below any difference that matters."""
+"""A search ends after a step that lowers the error by less than this fraction, far below any difference that
+matters."""
 
 COARSE = 1e-3
 """[fraction of the error] The same limit for a search that only ranks shapes or shows whether to go on: far below
@@ -43,8 +44,8 @@ records with two nearly equal time constants ended up to 8e-4 above the smallest
 1e-6 (`test_start_transients::test_nearly_equal_responses`, seeds 0 to 599)."""
 
 RESTARTS = 4
-"""[searches] Maximum number of searches for start memories with the same effects. Another follows only if the last one
-lowered the error by `BETTER`, so this only bounds the time."""
+"""[searches] Maximum number of searches for start memories with the same effects. Another search follows only if the
+last one lowered the error by `BETTER`, so this number only bounds the time."""
 
 
 class _Block:
@@ -125,7 +126,7 @@ class _Block:
     def _begun(self, other: Actuator) -> Array:
         """The response to the start state with other parameters; a factor at its limit follows the limit."""
         free = other.nuisances(self._item, self._offset)
-        if len(free) != self._free:  # a spectrum with another number of states
+        if len(free) != self._free:  # another spectrum may have another number of states
             return self._begun(self._here)
         held, factors = self.held, self._factors.copy()
         factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
@@ -178,7 +179,7 @@ def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
     """The system of all records and its best weights, with the free components of each record within their limits.
 
     A component found beyond a limit gets a slack from it, solved for with the weights (nnls), until none is beyond its
-    limit. This terminates, since a component keeps its slack until it has changed sides `CROSSINGS` times.
+    limit. The iteration terminates, since a component keeps its slack until it has changed sides `CROSSINGS` times.
     """
     whole = reduction.triangle(*(block.system() for block in blocks))
     solution = pi.non_negative(whole, np.arange(plays))
@@ -423,7 +424,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
 
     The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), with J the
     Jacobian of the free-run error with respect to weights and parameters together, zero weights kept at zero; `tau`,
-    the correlation time of the residuals in samples, turns their number into the effective one. The intervals come from
+    the correlation time of the residuals in samples, converts their number to an effective one. The intervals come from
     shapes drawn with this covariance and kept within the bounds.
     """
     shape, p = fitted.shape, fitted.weights

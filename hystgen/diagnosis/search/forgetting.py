@@ -1,9 +1,9 @@
 """Whether the hysteresis departs from a play sum: minor loops stay open and depend on the past, at any speed.
 
-A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little
-with all the drive's travel. An element that does so is fitted in parallel with the plays, like an effect, and judged by
-the same rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are
-equivalent: the element can then replace creep, a lag or a rate dependence, and they can replace it.
+A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget gradually
+as the drive travels. An element that does so is fitted in parallel with the plays, like an effect, and judged by the
+same rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are equivalent:
+the element can then replace creep, a lag or a rate dependence, and vice versa.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     """The element, if the records support it in addition to the effects found or instead of them; else None.
 
     The element first replaces all effects of the `outcome`, then only those that depend on time; then it is tried in
-    addition to all. Effects that explain more are kept. If the difference may be chance, the effects are kept if the
-    drive covers equal distances in different times, since effects of time and of travel then differ.
+    addition to all. Effects that explain more than the element are kept. If the difference may be chance, the effects
+    are kept if the drive covers equal distances in different times, since effects of time and of travel then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):

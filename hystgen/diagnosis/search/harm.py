@@ -48,7 +48,8 @@ class Wild:
 
 
 def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
-    """How far the inverse's changes exceed the effects' `gain` in the worst held-out record; None if they do not.
+    """How far the inverse's changes exceed the effects' `gain` in the worst held-out record; None if they stay within
+    it.
 
     The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
@@ -60,7 +61,7 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
 
 def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
-    """The two inverses over one record; None if one of them fails or too few samples are compared."""
+    """The two inverses over one record; None if an inverse fails or too few samples are compared."""
     end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]

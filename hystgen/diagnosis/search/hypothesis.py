@@ -49,7 +49,7 @@ LEVEL_STEPS = 3
 
 RANK = 1e-10
 """[fraction of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
-reduction keeps them to 2e-16 of the largest, so one of this size still has six digits. Set by:
+reduction keeps singular values to 2e-16 of the largest, so a value of this size still has six digits. Set by:
 `test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
@@ -74,9 +74,9 @@ class Actuator(Ordered):
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant added to them.
 
-        They hold only the compared samples if no later part needs the others; `compared` picks the compared ones in any
-        case. With `p`, a single row: the weighted sum, which passes through the rest of the chain once. `sums`:
-        weighted sums shared by actuators with common effects.
+        The rows hold only the compared samples if no later part needs the others; `compared` picks those in any case.
+        With `p`, a single row: the weighted sum, which passes through the rest of the chain once. `sums`: weighted sums
+        shared by actuators with common effects.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -103,7 +103,8 @@ class Actuator(Ordered):
 
     @cached_property
     def _needed(self) -> int:
-        """The last part of the chain that needs every sample; after it the compared ones are enough."""
+        """The last part of the chain that needs every sample; the compared samples are enough for the parts after
+        it."""
         if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
             return _MAPPED
         if len(self.filters) < len(self.at(Place.LINEAR)):

@@ -38,7 +38,7 @@ class Option:
     """One way to extend a hypothesis. `front`: whether it adds a front, which is named after the fit.
 
     `structure`: with all parameters free; `alone`: with only the extension's parameters free, from `starts`. `beyond`:
-    label of the simpler option that this one contains and follows; `grown`: a start from that option's parameters.
+    label of the simpler option that this option contains and follows; `grown`: a start from that option's parameters.
     """
 
     label: str
@@ -134,7 +134,8 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
     """`LIMIT` for a front that is linear between flatter ends, or bends in the same way at both ends; else `BEND`.
 
-    Both names if only one end is slightly flatter: a soft limit at that end and a bent actuator give the same front.
+    Returns both names if only one end is slightly flatter: a soft limit at that end and a bent actuator give the same
+    front.
     """
     v = np.linspace(*drive, SLOPE_PLACES)
     w = v
@@ -317,7 +318,7 @@ class _Trial(NamedTuple):
     k: int
     """index of the option"""
     shape: Array | None = None
-    """start of the search; for a shape that contains a simpler one, the parameters of that one"""
+    """start of the search; for a shape that contains a simpler one, the parameters of the simpler one"""
     weights: Array | None = None
     """weights close to the weights at the start"""
     steps: int = 0

@@ -170,7 +170,7 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
     """Errors of a hypothesis given the free start states and offset of an effect, which do not count as its merit.
 
-    Its own free start states are used instead if the error is then smaller. `terms`: from `Records.terms`.
+    The hypothesis's own free start states are used instead if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
@@ -188,15 +188,15 @@ def _only_grows(fitted: Fitted) -> Refusal | None:
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     """All candidates tried: first the best and those about as good, ordered by number of parameters.
 
-    A candidate is about as good in two cases. Its held-out error with the same free start states is no larger, however
-    much better the best one fits (two shapes of one effect each have their own free states, which are part of the
-    effect). Or its held-out error is within a few per cent, and its fitted error is equal, larger by chance or, if a
-    parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of the best is
-    the largest that is tried, all candidates that are `alike` are about as good: so much creep can also follow a lag.
-    With equal numbers of parameters, the error over all records decides; if these errors are nearly equal, the held-out
-    error decides; then `place`: a lag, which every amplifier has, before a delay. A small lead on held-out records,
-    whose error may belong mostly to a third effect, does not make a candidate the best if its fitted error is far
-    larger than another's.
+    A candidate is about as good in two cases. First, its held-out error with the same free start states is no larger,
+    however much better the best one fits (two shapes of one effect each have their own free states, which are part of
+    the effect). Second, its held-out error is within a few per cent, and its fitted error is equal, larger by chance
+    or, if a parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of
+    the best is the largest that is tried, all candidates that are `alike` are about as good: so much creep can also
+    follow a lag. With equal numbers of parameters, the error over all records decides; if these errors are nearly
+    equal, the held-out error decides; then `place`: a lag, which every amplifier has, before a delay. A small lead on
+    held-out records, whose error may belong mostly to a third effect, does not make a candidate the best if its fitted
+    error is far larger than another's.
     """
     if not tried:
         return []
@@ -345,8 +345,8 @@ class Explained:
 
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
-    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without them, compared
-    with the same free start states and offsets."""
+    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without the effects,
+    compared with the same free start states and offsets."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -357,11 +357,11 @@ def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, E
 def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     """Why the effects found are withdrawn, or None: together they must explain most of the gap.
 
-    This applies to held-out and to fitted records. Many effects can remove part of a disturbance; the remaining error
-    distinguishes a disturbance from a real effect. Records of one loop support no name if more than noise remains, and
-    too few compared samples support none at all. If much remains, no parameter of an effect may be at an end of its
-    range unless nine tenths are explained: an effect so strong, slow or fast can follow part of any error, but not most
-    of it.
+    The criterion applies to held-out and to fitted records. Many effects can remove part of a disturbance; the
+    remaining error distinguishes a disturbance from a real effect. Records of one loop support no name if more than
+    noise remains, and too few compared samples support none at all. If much remains, no parameter of an effect may be
+    at an end of its range unless nine tenths are explained: an effect so strong, slow or fast can follow part of any
+    error, but not most of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -417,7 +417,7 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """An effect that was accepted, and the held-out rms before and after it."""
+    """An accepted effect, and the held-out rms without and with it."""
 
     name: str
     label: str
@@ -450,8 +450,8 @@ class Withdrawal:
 class Outcome:
     """The refitted nominal model, the model to be written, its effects, and the ranking of each round.
 
-    `ends`: its parameters at an end of their ranges; `written`: which model is written: `extended` by effects,
-    `refitted`, `given`, or `identified` independently of the nominal one.
+    `ends`: parameters at an end of their ranges; `written`: which model is written: `extended` by effects, `refitted`,
+    `given`, or `identified` independently of the nominal one.
     """
 
     refitted: Fitted
@@ -760,8 +760,8 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
     """Two effects that hide each other: neither qualifies alone, but each does next to the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
-    records, and with each effect that is certain on fitted records. Alone, the first may even raise the error; it is
-    then credited with none of the gap.
+    records, and with each effect that is certain on fitted records. Without the second effect, the first may even raise
+    the error; it is then credited with none of the gap.
     """
     one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
@@ -805,7 +805,7 @@ def _without_needless(
 ) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
     """Drop earlier effects that later ones have made needless.
 
-    Returns the model, the remaining effects, and for each earlier one the model without it.
+    Returns the model, the remaining effects, and for each earlier effect the model without it.
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
