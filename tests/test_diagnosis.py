@@ -170,7 +170,7 @@ class TestBlindPlants:
         page = html.unescape(re.sub(r"\s+", " ", shown))
         reason = " ".join(emitted[2].split("error: ", 1)[-1].split())
         assert ("They cannot be emitted as C yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
-        assert ("Error that the compensator would leave in the motion:" in page) == (emitted[0] == 0)
+        assert ("Error of the motion with the compensator:" in page) == (emitted[0] == 0)
         assert (reason in " ".join(err.split())) == (emitted[0] != 0)
         assert page.count("Your next step: ") == 1
         assert ("Your next step: write the compensator as C." in page) == (emitted[0] == 0)
@@ -309,7 +309,7 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
         ("no less", "the largest value tried: a range up to 9 leaves 0.07 um rms"),
         ("limit", "the largest value tried: a wider range changes nothing"),
         ("firm", "the largest value tried: its range is not widened"),
-        ("noise", "the largest value tried: only noise is left"),
+        ("noise", "the largest value tried: only noise remains"),
     ],
 )
 def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
@@ -868,7 +868,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
     words = ["identify"] if command == "identify" else ["diagnose", _model(tmp_path)]
     code, _, err = run(*words, files[0], files[1], "--holdout", files[3], "-o", tmp_path / "out")
     assert code == 0, err
-    assert "warning: d.csv: held out, but also fitted, as a.csv, so it tests nothing; leave it out of" in err
+    assert "warning: d.csv: held out, but also fitted, as a.csv, so it is no test; leave it out of" in err
     assert "b.csv" not in err
     code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
     assert code == 0, err
@@ -1310,4 +1310,4 @@ def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2], history=[0.0])
     assert found.content["gap"]["after"]["fit"] > 5.0 * found.content["noise_floor"]
     assert (found.verdict, found.content["effects"]) == ("unexplained", [])
-    assert "rms is left on the fitted records" in found.sentence()
+    assert "rms remains on the fitted records" in found.sentence()

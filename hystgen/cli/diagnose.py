@@ -92,7 +92,7 @@ def diagnose(
         given = [option for option, value in unused.items() if value]
         if given:
             raise click.UsageError(
-                f"--plan comes before anything is measured: leave out {', '.join(given)}, or leave out --plan to "
+                f"--plan comes before any measurement: leave out {', '.join(given)}, or leave out --plan to "
                 "diagnose records"
             )
         if dac_coding is not None and dac_bits is None:

@@ -276,8 +276,8 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
         return found, []
     u = f" {unit}" if unit else ""
     return best, [
-        f"{WRITTEN[selection.IDENTIFIED]} is written, since it leaves {records.residual(other):.4g}{u} rms on held-out "
-        f"records, less than {WRITTEN[found.written]} with {left:.4g}{u}"
+        f"{WRITTEN[selection.IDENTIFIED]} is written: its held-out rms error is {records.residual(other):.4g}{u}, "
+        f"below the {left:.4g}{u} of {WRITTEN[found.written]}"
     ]
 
 

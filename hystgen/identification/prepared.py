@@ -64,7 +64,7 @@ def courses(
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LONG_GAP:g} steps; what the drive did in them is unknown, so each part starts anew"
+            f"{faults.LONG_GAP:g} steps; the drive in these gaps is unknown, so each part starts anew"
         )
         made += found
     for k, item in enumerate(made):

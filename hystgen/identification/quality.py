@@ -355,7 +355,7 @@ def about_start(errors: FreeRunErrors, largest: float) -> str:
         return ""
     return (
         f"{item.name}: the output of the first {counted(end, 'sample')}, which depends on the history, is off by "
-        f"{start:.3g} rms against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out "
+        f"{start:.3g} rms against {rest:.3g} for the rest; the history may be wrong. Leave it out "
         "if in doubt"
     )
 
@@ -371,7 +371,7 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
                 else:
                     alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out, but also fitted{alike}, so it tests nothing; leave it out of "
+                        f"{record.name}: held out, but also fitted{alike}, so it is no test; leave it out of "
                         "one of the two"
                     )
                 break

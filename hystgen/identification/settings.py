@@ -49,7 +49,7 @@ class Settings:
         """Sentences about settings kept and dropped; `fit`: the fit without these settings."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing is kept of the old file, which is not a parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing kept from the old file, which is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._kept(fit):
             names.insert(0, "units")

@@ -94,7 +94,7 @@ class Tempo:
         across = float(span) * 10.0**-grid.digits / (OF_RATE * max_rate * sample_time)
         seconds = max(across, FULL_SCALE) * sample_time
         if not seconds <= LONGEST_MOVE:
-            what = f"one move over the input range takes {seconds:.3g} s, and a plan hundreds of them"
+            what = f"one move over the input range takes {seconds:.3g} s, and a plan has hundreds of moves"
             raise PlanError([f"{what}; give a larger max rate or a shorter sample time"])
         fast = max(1, math.ceil(across / LONGEST_EDGE))
         slow = max(math.ceil(SLOW / sample_time), math.ceil(SLOWER * FAST_SAMPLES * fast))

@@ -288,7 +288,7 @@ RECORDS = (
         _multisine, _fast,
     ),
     RecordKind(
-        "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
+        "reversals", "Random turning points at a medium pace, to judge findings between slow and fast.",
         partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     RecordKind(

@@ -31,7 +31,7 @@ def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: S
 
 def _texts(values: NDArray[np.generic]) -> list[str]:
     if values.ndim != 1:
-        raise ValueError("a column has one dimension")
+        raise ValueError("a column must have one dimension")
     if values.dtype == np.float64 or values.dtype.kind in "iub":
         return [repr(x) for x in values.tolist()]
     return [str(x) for x in values]

@@ -83,7 +83,7 @@ def _next_step(found: Diagnosis) -> Text:
         plan = "hystgen diagnose --plan params.yaml -o plan/"
         return Text("Your next step: record drives in which every effect shows.", plan)
     if found.not_emitted():
-        return Text("Your next step: see how much error the model would leave.", "hystgen track params.yaml RECORDS")
+        return Text("Your next step: see the tracking error with the model.", "hystgen track params.yaml RECORDS")
     return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
 
 
@@ -149,7 +149,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text("What they mean for a compensator:"),
         HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
-        else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
+        else Text("Error of the motion with the compensator:", "hystgen track params.yaml RECORDS"),
         Text(
             "Their parameters. The intervals account for correlated residuals and for free weights, but not for other "
             "shapes that may fit as well:"
@@ -197,7 +197,7 @@ def _left(result: Result) -> list[Text | Listing | HtmlTable]:
         if is_noise(after, noise):
             return [Text("Only noise.")]
         times = f"The remaining error is {times_noise(after / noise)}"
-        return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
+        return [Text(f"{times}, but it has no distinct features: noise that is not white looks the same.")]
     sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | HtmlTable] = [Listing(sentences)]
     for each in seen:
@@ -280,4 +280,4 @@ def _ranking(result: Result) -> list[Text | HtmlTable]:
             rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
         blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), HtmlTable(rows, (0, 1, 5))]
-    return blocks or [Text("None: the refitted model leaves only noise.")]
+    return blocks or [Text("None: with the refitted model, only noise remains.")]

@@ -316,7 +316,7 @@ FIGURES = {
 
 CAPTIONS = {
     "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after another; "
-    "dotted: what each step removes. The dashed line is the noise, measured without a model.",
+    "dotted: the part that each step removes. The dashed line is the noise, measured without a model.",
     "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted.",
     "records": "rms error of every record, against the noise.",
     "time": "rms error in stretches of the records over the session.",

@@ -118,22 +118,22 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
 
 
 REFUSALS = {
-    "one_loop": "it leaves {value:.0%} of the gap above the noise; records of one loop allow at most {limit:.0%}",
-    "little": "on equal terms it removes {value:.3g}{unit} rms, and {limit:.3g}{unit} is needed",
-    "chance": "chance explains what it removes from held-out records (p = {value:.1g}, at most {limit:g} is needed)",
-    "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, at most {limit:g} is needed)",
+    "one_loop": "{value:.0%} of the gap above the noise remains; records of one loop allow at most {limit:.0%}",
+    "little": "on equal terms it removes {value:.3g}{unit} rms, but {limit:.3g}{unit} is needed",
+    "chance": "its gain on held-out records may be due to chance (p = {value:.1g}, must be at most {limit:g})",
+    "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, must be at most {limit:g})",
     "small": "it removes {value:.0%} of the gap, but a name needs {limit:.0%}",
-    "most": "the effects found leave {value:.3g}{unit} rms, most of the former {limit:.3g}{unit}",
-    "above": "the effects found leave {value:.3g}{unit} rms; records of one loop allow at most {limit:.3g}{unit}",
-    "given": "the effects found leave {value:.3g}{unit} rms, but the model as given only {limit:.3g}{unit}",
-    "identified": "the effects found leave {value:.3g}{unit} rms, but the model of `identify` only {limit:.3g}{unit}",
+    "most": "with the effects, {value:.3g}{unit} rms remains, most of the former {limit:.3g}{unit}",
+    "above": "with the effects, {value:.3g}{unit} rms remains; records of one loop allow at most {limit:.3g}{unit}",
+    "given": "with the effects, {value:.3g}{unit} rms remains, but only {limit:.3g}{unit} with the model as given",
+    "identified": "with the effects, {value:.3g}{unit} rms remains, but only {limit:.3g}{unit} with that of `identify`",
     "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
-    "grows": "with a time constant of {value:.3g} s it only grows in {limit:.3g} s of records, as disturbances may",
-    "range": "with a parameter at an end of its range, the effects found leave {value:.0%} of the gap above the noise, "
-    "but may then leave at most {limit:.0%}",
-    "forgets": "hysteresis other than a play sum explains the error as well or better and leaves {value:.3g}{unit} rms",
-    "wild": "its inverse moves the output of the plain model by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
+    "grows": "with a time constant of {value:.3g} s it only grows during {limit:.3g} s of records, as disturbances can",
+    "range": "{value:.0%} of the gap above the noise remains; with a parameter at an end of its range, "
+    "at most {limit:.0%} may",
+    "forgets": "hysteresis other than a play sum explains the error at least as well: {value:.3g}{unit} rms remains",
+    "wild": "its inverse changes the plain model's output by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
     "other": "another shape does better, or as well with fewer parameters",
 }
 """Reasons why an effect that was tried is not named, as text."""
@@ -220,7 +220,7 @@ def _evidence(each: Found, refitted: float, noise: float) -> str:
     said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
     if is_noise(each.after, noise) or not refitted:
         return said
-    return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap are left"
+    return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap remain"
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:

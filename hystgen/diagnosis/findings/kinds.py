@@ -63,13 +63,13 @@ class Fault(Finding):
 class SwappedChannels(Fault):
     """A record whose drive and displacement columns were swapped and have been put right."""
 
-    kind, noun, qualifier = "swapped_channels", "record", " with exchanged columns"
+    kind, noun, qualifier = "swapped_channels", "record", " with swapped columns"
     record: str
     repaired: bool = True
 
     def sentence(self, unit: str | None) -> str:
         return (
-            f"{self.record}: drive and displacement are exchanged (the model fits them the other way round); put right"
+            f"{self.record}: drive and displacement were swapped (the model fits them the other way round); put right"
         )
 
 
@@ -299,7 +299,7 @@ class NotAPlaySum(Finding):
         )
         return (
             f"the hysteresis is not a play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height if "
-            f"they span a tenth of the drive range, and depend on what came before. A part that forgets over "
+            f"they span a tenth of the drive range, and depend on the earlier drive. A part that forgets over "
             f"{100.0 * self.way:.2g} % of the range reduces the held-out rms error from {self.before:.4g} to "
             f"{self.after:.4g}{_unit(unit)}{instead}"
         )
@@ -369,7 +369,7 @@ class Structured(Finding):
 
     def sentence(self, unit: str | None) -> str:
         times = f", {times_noise(self.above_floor)}" if self.above_floor else ""
-        return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
+        return f"an error of {self.rms:.3g}{_unit(unit)} rms remains{times}; it {self.words()}"
 
     def words(self) -> str:
         """What the error depends on, as a predicate."""

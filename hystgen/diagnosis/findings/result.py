@@ -48,7 +48,7 @@ class Gap:
 NO_WIDER = {
     "limit": "a wider range changes nothing",
     "firm": "its range is not widened",
-    "noise": "only noise is left",
+    "noise": "only noise remains",
 }
 """Reasons why no wider range was tried, as text."""
 
@@ -309,11 +309,11 @@ class Diagnosis:
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
             whose = WRITTEN[result.written]
-            return f"Nothing is missing: {whose} leaves {after} rms on held-out records, which is noise"
+            return f"Nothing is missing: the held-out rms error of {whose} is {after}, which is noise"
         where, left = "", gap.after.holdout
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " on the fitted records", gap.after.fit
-        missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
+        missing = f"{self._missing()}: {self._rms(left)} rms remains{where}{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structured | NotAPlaySum)]
         if not disturbing:
             return missing
@@ -339,7 +339,7 @@ class Diagnosis:
             return ""
         if self.result.withdrawn is not None and not self._limits():
             return f". {self._withdrawn(self.result.withdrawn)}"
-        return f". The closest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+        return f". The closest is {closest.name}, with a residual of {self._rms(closest.holdout)}; {closest.refused}"
 
     def _withdrawn(self, found: Withdrawn) -> str:
         """The residual error with the withdrawn effects, and why they were withdrawn."""
