@@ -392,7 +392,7 @@ class Structured(Finding):
 
     def advice(self) -> list[str]:
         advice = []
-        if self.held_out_alone:  # never fitted, so an effect that only they show cannot be found
+        if self.held_out_alone:  # never fitted, so an effect that shows only in these cannot be found
             alone = several(self.held_out_alone)
             advice.append(f"fit {alone} too and hold out others: the remaining error shows only in held-out records")
         if self.rate_free is None:

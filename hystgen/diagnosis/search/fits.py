@@ -358,7 +358,7 @@ def restarts(item: Item) -> bool:
 
 
 def _turns(fitted: Fitted, item: Item) -> Turns | None:
-    """Drive values that lead virgin plays to the start memory that fits an item best; None if none is found."""
+    """Drive values that bring virgin plays to the start memory that fits an item best; None if none is found."""
     actuator, r, p = fitted.actuator, fitted.structure.thresholds, fitted.weights
     seen = actuator.course(item, actuator.error(item, p))
     alone = replace(seen, y=seen.y + reduction.prediction(seen.v, seen.history, r, p), history=None)

@@ -166,13 +166,13 @@ class Tried:
     option: Option
     fitted: Fitted
     names: tuple[str, ...]
-    """its name, and others that the same front may have"""
+    """its name, and other names that the same front may have"""
     held_out: float
     errors: list[Array]
 
     @property
     def name(self) -> str:
-        """The first of its names."""
+        """The first of the option's names."""
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
@@ -305,7 +305,7 @@ class _Screened:
 
     @property
     def numbers(self) -> int:
-        """Number of its parameters."""
+        """Number of the option's parameters."""
         return len(self.option.alone.start)
 
 

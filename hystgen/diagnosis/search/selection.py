@@ -361,7 +361,7 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     remaining error distinguishes a disturbance from a real effect. Records of one loop support no name if more than
     noise remains, and too few compared samples support none at all. If much remains, no parameter of an effect may be
     at an end of its range unless nine tenths are explained: an effect so strong, slow or fast can follow part of any
-    error, but not most of it.
+    error, but not nine tenths of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -662,7 +662,7 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None if there is no extension to try.
+    """The best extension of a hypothesis and the extensions that were tried; None if there is no extension to try.
 
     `start`: the same hypothesis with other parameters, from which extensions are searched for; `least`: as in
     `merit_of`. An extension may explain most only through its free start states and have no merit on equal terms; then
