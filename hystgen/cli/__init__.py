@@ -36,5 +36,5 @@ def main() -> None:
     from hystgen.basics import jit
 
     atexit.register(gc.freeze)  # or the last search takes 62 of 1,486 million, for memory that the process returns
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would search every installed distribution
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # would search every installed distribution
     jit.announce = console.note

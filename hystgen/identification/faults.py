@@ -70,7 +70,7 @@ def outliers(error: Array, v: Array, swing: float) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is never flagged.
 
     `swing`: peak-to-peak output; errors far below `swing` do no harm. Samples at a step of the drive `v` (N,) do not
-    count, which a model without a lag or a resonance does not predict.
+    count: a model without a lag or a resonance cannot predict them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
@@ -136,7 +136,7 @@ def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
 def _stands_out(x: Array, first: int, last: int) -> bool:
     """Whether samples [first, last) jump away and back abruptly, by far more than the signal moves around them.
 
-    The tip of a triangle does not, nor does a move of a few samples that a model misses.
+    The tip of a triangle does not count, nor does a move of a few samples that a model misses.
     """
     jump, away = _jump(x, first, last)
     if jump < AT_ONCE * float(np.max(away)):
@@ -151,8 +151,8 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
 def wrong_drive(v: Array, y: Array) -> Flags:
     """Isolated samples of the drive that jump away and back without a response of the output (NaN: unknown).
 
-    A real pulse of the drive shows in the output, at once or a little later; a pulse that does not is a fault of the
-    recording. At either end of a record there is only one jump. Placeholders for "no value" always count as wrong.
+    A real pulse of the drive shows in the output, at once or a little later; a pulse without a response is a recording
+    fault. At either end of a record there is only one jump. Placeholders for "no value" always count as wrong.
     """
     found = no_value(v)
     known = np.isfinite(y)
@@ -188,7 +188,7 @@ def pulses(v: Array) -> list[tuple[int, int]]:
 def returns(v: Array, first: int, last: int) -> bool:
     """Whether the drive departs from its course at samples [first, last) by a sizeable part of its range, and returns.
 
-    At the end of a record, where the drive cannot come back, it has to stand out as well.
+    At an end of the record, where the drive cannot come back, it must stand out as well.
     """
     _, away = _jump(v, first, last)
     if first == 0 or last == len(v):

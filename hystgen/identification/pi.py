@@ -191,7 +191,8 @@ NO_PLAYS = "no hysteresis was found: the model has no play besides r_0, and its 
 
 
 def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:
-    """The sense of reduced records; `squares`: the sum of squared errors with positive weights."""
+    """How the output of reduced records moves with the drive; `squares`: the sum of squared errors with positive
+    weights."""
     together = sum(_covaried(item) for item in courses if item.used)
     some = np.unique(np.linspace(0, len(reduced.thresholds) - 1, SENSED_PLAYS + 1).astype(int))
     matrix, target = reduced.whole[:, some], reduced.whole[:, -1]
@@ -325,10 +326,11 @@ def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[A
 LEAST_TRAVEL = 0.15
 """The largest play still moves over this fraction of the drive's peak-to-peak range.
 
-A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, the play's weight depends only on
-the last few samples before each reversal and can take any value, yet it takes full effect once the drive becomes
-slightly larger. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much
-drive as the gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with r_n = 0.9.
+A play of threshold r moves over `p-p - 2 r` in a settled loop. As this motion goes to zero, the play's weight depends
+only on the last few samples before each reversal and can take any value, yet it takes full effect once the drive
+becomes slightly larger. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as
+much drive as the gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with r_n =
+0.9.
 """
 
 LEAST_VISIBLE = 0.05

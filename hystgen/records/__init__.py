@@ -123,14 +123,14 @@ def read_record(
     """Read one data file, or make a record from samples in memory.
 
     `path`: path of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the
-    order t, v, y. `columns`: maps our column names to the file's (`{"t": "Time"}`). A file's name may be the whole name
-    (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), its last part, or its last part without a
-    unit, as long as it matches only one column; or the column's number, `#2`. `t`, `v` and `y` are found the same way,
-    or else by meaning, if only one column has such a name (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a
-    file without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that must
-    be present. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a drive
-    that moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are dropped
-    with a note, up to 5 % of the record. A time in another unit is converted to seconds.
+    order t, v, y. `columns`: maps our column names to the file's (`{"t": "Time"}`). A column of the file can be given
+    by its whole name (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), by the last part of the
+    name, with or without a unit, if only one column matches; or by its number, `#2`. `t`, `v` and `y` are found the
+    same way, or else by meaning, if only one column has such a name (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds,
+    for a file without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that
+    must be present. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a
+    drive that moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are
+    dropped with a note, up to 5 % of the record. A time in another unit is converted to seconds.
 
     Raises RecordError with every problem in the file.
     """

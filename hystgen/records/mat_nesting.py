@@ -1,7 +1,7 @@
 """Nesting depth of structs and cells in a MATLAB v5 file, from its headers alone.
 
-scipy reads them by recursion in C, so a file of a few hundred kilobytes can crash the process. The elements are
-therefore walked here first, in the order in which scipy reads them, with an explicit stack.
+scipy reads structs and cells by recursion in C, so a file of a few hundred kilobytes can crash the process. The
+elements are therefore walked here first, in the order in which scipy reads them, with an explicit stack.
 """
 
 from __future__ import annotations

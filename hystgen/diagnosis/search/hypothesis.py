@@ -277,7 +277,7 @@ class Actuator(Ordered):
 
     @cached_property
     def _numbers(self) -> object:
-        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # keys of a user's effect may hold lists
+        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # keys may hold lists
         return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
