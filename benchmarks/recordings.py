@@ -41,7 +41,7 @@ REPORTED = {
     "explains only": "explains little",
     "Something is missing": "more is missing",
     "is not explained": "most is unexplained",
-    "too little to judge": "start unknown",
+    "too few samples to judge": "start unknown",
     "can be compared": "too short",
 }
 """Parts of the program's messages about recordings, and short words for them."""

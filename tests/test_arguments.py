@@ -111,7 +111,7 @@ RECORDS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "length of a column": (lambda: hystgen.identify(Record("a", T, V, V, {"c": V[1:]})), ValueError, "and 59 of c"),
     "a column of v": (lambda: hystgen.identify(Record("a", T, V.reshape(-1, 1), V)), ValueError, "v of a has one"),
     "texts in v": (lambda: hystgen.identify(Record("a", T, ["x"] * 60, V)), TypeError, "v of a is an array of real"),
-    "no name": (lambda: hystgen.identify(Record(T, V, V)), TypeError, "name is text"),
+    "no name": (lambda: hystgen.identify(Record(T, V, V)), TypeError, "name must be text"),
 }
 OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "units as a pair": ({"units": ("V", "nm")}, TypeError, r"units is a mapping .* not a tuple; give {'input': 'V'"),

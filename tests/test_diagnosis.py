@@ -170,7 +170,7 @@ class TestBlindPlants:
         page = html.unescape(re.sub(r"\s+", " ", shown))
         reason = " ".join(emitted[2].split("error: ", 1)[-1].split())
         assert ("They cannot be emitted as C yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
-        assert ("Error that the compensator would leave in the motion:" in page) == (emitted[0] == 0)
+        assert ("Error of the motion with the compensator:" in page) == (emitted[0] == 0)
         assert (reason in " ".join(err.split())) == (emitted[0] != 0)
         assert page.count("Your next step: ") == 1
         assert ("Your next step: write the compensator as C." in page) == (emitted[0] == 0)
@@ -309,7 +309,7 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
         ("no less", "the largest value tried: a range up to 9 leaves 0.07 um rms"),
         ("limit", "the largest value tried: a wider range changes nothing"),
         ("firm", "the largest value tried: its range is not widened"),
-        ("noise", "the largest value tried: only noise is left"),
+        ("noise", "the largest value tried: only noise remains"),
     ],
 )
 def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
@@ -809,10 +809,10 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     assert found.verdict == "nothing_missing"
     assert any("90 of 660 samples are compared" in note and "--history" in note for note in found.notes)
     short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples at most .*--history"):
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: at most \d in a .*--history"):
         hystgen.diagnose(path, short, holdout=short)
     last = record(v[:600], np.asarray(sweep.y)[:600], "last")  # it ends at its largest drive
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: there is too little to fit: 1 sample at"):
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: too few samples to fit: at most 1 in a"):
         hystgen.diagnose(path, last, holdout=last)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
@@ -868,7 +868,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
     words = ["identify"] if command == "identify" else ["diagnose", _model(tmp_path)]
     code, _, err = run(*words, files[0], files[1], "--holdout", files[3], "-o", tmp_path / "out")
     assert code == 0, err
-    assert "warning: d.csv: held out, but also fitted, as a.csv, so it tests nothing; leave it out of" in err
+    assert "warning: d.csv: held out, but also fitted, as a.csv, so it is no test; leave it out of" in err
     assert "b.csv" not in err
     code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
     assert code == 0, err
@@ -890,9 +890,9 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     held = made[4:] if held_out else made[3:]
     found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
     spec = " ".join(found.notes)
-    assert ("sweep: there is too little to judge by" in spec) is held_out
+    assert ("sweep: too few samples to judge by" in spec) is held_out
     assert ("held-out record was given: c set aside" in spec) is held_out
-    assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
+    assert ("sweep: only 1 sample compared" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
 
@@ -1310,4 +1310,4 @@ def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2], history=[0.0])
     assert found.content["gap"]["after"]["fit"] > 5.0 * found.content["noise_floor"]
     assert (found.verdict, found.content["effects"]) == ("unexplained", [])
-    assert "rms is left on the fitted records" in found.sentence()
+    assert "rms remains on the fitted records" in found.sentence()

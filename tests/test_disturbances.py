@@ -595,7 +595,7 @@ def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> No
     assert ripple["amplitude"] == pytest.approx(0.05, rel=0.15)
     assert found.content["gap"]["after"]["holdout"] < 1.25 * NOISE
     (note,) = [note for note in found.notes if "ripple" in note]
-    assert note.endswith("taken out of the records before effects were sought")
+    assert note.endswith("removed from the records before the search for effects")
 
 
 @pytest.mark.thorough(but_one_in=3)

@@ -511,7 +511,7 @@ def test_without_dask_one_line_says_what_to_install(
         (["--batch", "few", "-o", "new", "--holdout", "few/SN-100.csv"], "write {unit} for the unit's name"),
         (["--batch", "few", "-o", "few"], "few contains records"),
         (["--batch", "few", "-o", "few/SN-100.csv"], "few/SN-100.csv: File exists"),
-        (["--batch", "few", "-o", "new", "--thresholds", "-1"], "thresholds is a number of plays"),
+        (["--batch", "few", "-o", "new", "--thresholds", "-1"], "thresholds must be a number of plays"),
         (["--batch", "few", "-o", "new", "--name", "stage"], "--name is for one model"),
         (["--batch", "few", "-o", "new", "--plot", "a.svg"], "--plot is for one model"),
         (["--batch", "few", "-o", "new", "--jobs", "0"], "--jobs"),

@@ -88,7 +88,7 @@ def test_a_file_that_is_no_parameter_file_is_replaced_aloud(text: str, words: st
     target.write_text(text)
     found, said = identified(target, run)
     assert found.sample_time is None
-    assert f"{target}: nothing is kept of the old file" in said
+    assert f"{target}: nothing kept from the old file" in said
     assert words in said
 
 

@@ -285,7 +285,7 @@ class TestPoints:
         fit.write(tmp_path / "a.yaml")
         found = hystgen.diagnose(tmp_path / "a.yaml", path)
         assert [each["name"] for each in found.content["effects"]][:1] in (["asymmetry"], ["noncongruent"])
-        assert any("effects that depend on it are not sought" in note for note in found.notes)
+        assert any("time-dependent effects are not tried" in note for note in found.notes)
 
 
     @pytest.mark.parametrize("name", ["Time", "timestamp", "Zeit [ms]"])

@@ -35,6 +35,6 @@ def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen.basics import jit
 
-    atexit.register(gc.freeze)  # or the last search takes 62 of 1,486 million, for memory that the process returns
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would search every installed distribution
+    atexit.register(gc.freeze)  # no garbage search at exit, which took 62 of 1,486 million for memory freed anyway
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # would search every installed distribution
     jit.announce = console.note

@@ -1,4 +1,4 @@
-"""Shared by the commands: arguments, options, and errors as messages with an exit code."""
+"""Code shared by the commands: arguments, options, and errors as messages with an exit code."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ ADVICE = {
 
 
 class Failed(click.ClickException):
-    """A failed check (exit code 1) or unusable input (2); the message says everything."""
+    """A failed check (exit code 1) or unusable input (2); only the message is shown."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
 
     def show(self, file: IO[str] | None = None) -> None:
-        """Print only the message, which already says that it is an error."""
+        """Print the message without the prefix that click adds to it."""
         console.note(self.message, file)
 
 
@@ -77,14 +77,14 @@ def guarded(path: str, action: Callable[[], T]) -> T:
         raise Failed(f"{path}: error: {error}", 1) from None
     except FormatError as error:
         raise Failed(str(located(path, error.problems)), 2) from None
-    except BrokenPipeError:  # the reader closed the pipe, which click handles quietly
+    except BrokenPipeError:  # the reader closed the pipe; click handles that quietly
         raise
     except (ValueError, OSError, MissingExtraError) as error:
         raise Failed(f"error: {_reason(error)}", 2) from None
 
 
 def _reason(error: Exception) -> str:
-    """The text of an error; for operating system errors the file, the reason and what to do."""
+    """The text of an error; for operating system errors the file, the reason and advice."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
@@ -176,9 +176,9 @@ def matched(_context: click.Context, _option: click.Parameter, value: tuple[str,
 
 
 class Judging(click.Command):
-    """A command with records and held-out records; warns of files after `--holdout FILE` that it would fit.
+    """A command with records and held-out records; warns about files after `--holdout FILE` that would be fitted.
 
-    A shell expands `--holdout *.csv` to `--holdout a.csv b.csv`, but the option takes only the first of these.
+    A shell expands `--holdout *.csv` to `--holdout a.csv b.csv`, but the option takes only the first file.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`hystgen diagnose`: what a model is missing, and the drives that show it."""
+"""`hystgen diagnose`: find what a model is missing, and plan the drives that reveal it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def diagnose(
     dac_coding: str | None, session: str | None, history: str | None, rest: float, skip: float,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
-    """Find what a model is missing: where it disagrees with records, which effect is missing, and the model with it.
+    """Find what a model is missing: where it disagrees with records, the missing effects, and the model with them.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
 
@@ -92,7 +92,7 @@ def diagnose(
         given = [option for option, value in unused.items() if value]
         if given:
             raise click.UsageError(
-                f"--plan comes before anything is measured: leave out {', '.join(given)}, or leave out --plan to "
+                f"--plan comes before any measurement: leave out {', '.join(given)}, or leave out --plan to "
                 "diagnose records"
             )
         if dac_coding is not None and dac_bits is None:

@@ -65,7 +65,7 @@ def _check(
     models: Sequence[tuple[str, Model]], texts: Sequence[Mapping[str, str]], output: str, options: Mapping[str, Any],
     effects: Sequence[str],
 ) -> None:
-    """Exit with code 1 if files on disk are stale; says how, and which commands bring them up to date."""
+    """Exit with code 1 if files on disk are stale; print the differences and the commands that update the files."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
 

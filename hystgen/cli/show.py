@@ -23,7 +23,7 @@ from hystgen.cli import common
 def show(
     params: str, plot: str | None, settle_within: float | None, json_file: str | None, effects: tuple[str, ...]
 ) -> None:
-    """Print the properties of a model: ranges, slopes, loop width, settling after a step, invertible or why not.
+    """Print the properties of a model: ranges, slopes, loop width, settling after a step, and whether it is invertible.
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """

@@ -1,4 +1,4 @@
-"""`hystgen track`: how well a compensator would track on the recorded actuator."""
+"""`hystgen track`: the tracking error of a compensator on the recorded actuator."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ def track(
 ) -> None:
     """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
 
-    The straight line is fitted to the records. Plays alone are the model without its effects; nothing else is changed
-    or refitted.
+    The straight line is fitted to the records. Plays alone are the model without its effects, otherwise unchanged.
 
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """

@@ -42,7 +42,7 @@ def verify(
 
     For several models in one report: hystgen verify stage_x.yaml stage_y.yaml --junit verify.xml
 
-    The exit code is 1 if bits differ or C cannot be built, and 2 if nothing is wrong except that a tool is missing.
+    The exit code is 1 if bits differ or C cannot be built, and 2 if the only problem is a missing tool.
     """
     from hystgen import verification
     from hystgen.basics import writing

@@ -1,5 +1,4 @@
-"""Find what a model is missing: where it disagrees with measured records, the name of the missing effect, and the model
-with that effect added.
+"""Compare a model with measured records, name the effects that it is missing, and add them to the model.
 
 >>> found = hystgen.diagnose("stage.yaml", ["slow.csv", "steps.csv"], holdout=["other.csv"])
 >>> found.verdict

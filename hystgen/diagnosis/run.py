@@ -59,18 +59,18 @@ def diagnose(
     delimiter: str | None = None,
     progress: bool = False,
 ) -> Diagnosis:
-    """Find what a nominal model is missing.
+    """Find the effects that a nominal model is missing.
 
     `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
     for `identify` and converted to the model's units; `holdout`: records with other waveforms, by which models are
     judged; if none are given, or too few of their samples can be compared, every third record, or the end of each, is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
-    `rest`: pause after them in seconds. `skip`: seconds at the start of every record that are left out of the
-    comparison, although their drive still counts. `effects`: further effects to try.
+    `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
+    although their drive still moves the plays. `effects`: further effects to try.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
-    weights to the free-run error, and accepted if it removes a worthwhile part of the held-out error and chance does
-    not explain the gain. Raises RecordError, IdentificationError, ValueError.
+    weights to the free-run error, and accepted if it removes a substantial part of the held-out error and the gain is
+    not due to chance. Raises RecordError, IdentificationError, ValueError.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 4.0, 4000)
@@ -184,8 +184,8 @@ class _Case:
         return done, wrong
 
     def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
-        """The prepared records, a function that refits the nominal model to them and, if the model has a front, one
-        that refits it without the front."""
+        """The prepared records, a function that refits the nominal model to them and, if the model has a front, a
+        function that refits it without the front."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)
@@ -197,7 +197,7 @@ class _Case:
         )
 
     def _foreign(self, history: History) -> OtherHistory | None:
-        """A finding if the model can follow the history only at the cost of the other samples, else None."""
+        """A finding if the model fits the history only at the expense of the other samples, else None."""
         if history is None:
             return None
         ready, refit, _ = self._begun(history)
@@ -226,7 +226,7 @@ class _Case:
     def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
         """The search, repeated if nothing could be named although much error remains.
 
-        Then the end of each fitted record is held out too, since it may show what held-out records do not.
+        The repeat also holds out the end of each fitted record, which may show effects that held-out records do not.
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
@@ -257,9 +257,9 @@ class _Case:
 
 
 def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
-    """The outcome or, if better, the model that `identify` chooses on the same samples, with a note that says so.
+    """The outcome or, if better, the model that `identify` chooses on the same samples, with a note about the change.
 
-    `identify` is not tried if only noise is left: on all records or, if effects are named, on the held-out ones.
+    `identify` is not tried if only noise remains: on all records or, if effects are named, on the held-out ones.
     """
     left, of_fitted = records.residual(found.fitted), rms(found.fitted.errors(records.to_fit))
     if acceptance.is_noise(left if found.found else max(left, of_fitted), records.noise):
@@ -276,8 +276,8 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
         return found, []
     u = f" {unit}" if unit else ""
     return best, [
-        f"{WRITTEN[selection.IDENTIFIED]} is written, since it leaves {records.residual(other):.4g}{u} rms on held-out "
-        f"records, less than {WRITTEN[found.written]} with {left:.4g}{u}"
+        f"{WRITTEN[selection.IDENTIFIED]} is written: its held-out rms error is {records.residual(other):.4g}{u}, "
+        f"below the {left:.4g}{u} of {WRITTEN[found.written]}"
     ]
 
 
@@ -303,7 +303,7 @@ def _harmless(
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:
-    """Whether the static part of the written model has an inverse, and what the user should know about it."""
+    """Whether the static part of the written model has an inverse, and warnings about it for the user."""
     from hystgen.model import cascade_of
 
     problems = cascade_of(extended).inverse_problems()

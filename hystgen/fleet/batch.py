@@ -37,7 +37,7 @@ from hystgen.identification.settings import Settings
 from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
-"""Suffixes of the files that are picked up from a folder."""
+"""Suffixes of the files that are read from a folder."""
 
 KEPT_IN = ".hystgen"
 """Folder, inside the output folder, with the results of finished units."""
@@ -53,10 +53,10 @@ COLUMNS = ("unit", "file", "status", "message", *FIGURES, "outlier", "outlier_in
 class Unit:
     """One row of the summary.
 
-    `name`: C identifier of the model; `file`: its record; `done`: whether it succeeded, otherwise `message` says in one
-    line what failed; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from the rest, and by
-    how much; empty if it does not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier
-    call; `settings`: keys kept from the existing parameter file.
+    `name`: C identifier of the model; `file`: the unit's record; `done`: whether it succeeded, otherwise `message`
+    describes the failure in one line; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from
+    the rest, and by how much; empty if there are none; `sha256`: hash of records, options, settings and tool version;
+    `kept`: whether an earlier call did the work; `settings`: keys kept from the existing parameter file.
     """
 
     name: str
@@ -101,7 +101,7 @@ class Fleet:
         return text.getvalue()
 
     def table(self) -> str:
-        """The counts, then a line for each unit that failed or is an outlier."""
+        """The counts, followed by a line for each failed unit and each outlier."""
         kept = sum(unit.kept for unit in self.units)
         found = f"{len(self.outliers)} of them outliers" if self.judged else "outliers not judged"
         lines = [
@@ -123,7 +123,7 @@ class Fleet:
 
 @dataclass(frozen=True)
 class _Job:
-    """The task for a unit; `key`: hash of everything that its outputs depend on."""
+    """The task for a unit; `key`: hash of everything that the unit's outputs depend on."""
 
     unit: str
     file: str
@@ -147,21 +147,22 @@ def identify_batch(
     """Fit a model to every unit of a fleet, and emit its C.
 
     `sources`: files, patterns such as `units/*.csv`, and folders; every file is one unit, named after the file as a C
-    identifier. `output`: a folder that gets, for each unit, `UNIT.yaml`, identical to what `identify` writes for that
-    unit alone, and the C files of `emit` in a folder `UNIT`; and at the end `summary.csv`, sorted by unit. `holdout`:
-    paths of held-out records in which `{unit}` stands for the name of the unit's file without its suffix; these files
-    are not units. `emit`: False leaves out the C; `emission`: options of `emit`. `jobs`: number of processes, all cores
-    by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package, but no
-    access to any file. `progress`: a progress bar on a terminal's stderr. Other options are those of `identify`.
+    identifier. `output`: a folder that receives, for each unit, `UNIT.yaml`, identical to the file that `identify`
+    writes for that unit alone, and the C files of `emit` in a folder `UNIT`; and at the end `summary.csv`, sorted by
+    unit. `holdout`: paths of held-out records in which `{unit}` stands for the name of the unit's file without its
+    suffix; these files are not units. `emit`: False omits the C files; `emission`: options of `emit`. `jobs`: number of
+    processes, all cores by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need
+    the package, but no access to any file. `progress`: a progress bar on a terminal's stderr. Other options are those
+    of `identify`.
 
     A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
     does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
-    An interrupted call leaves only complete files and keeps its finished units. When an existing parameter file is
+    After an interrupted call, all files are complete and finished units are kept. When an existing parameter file is
     rewritten, its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error (logarithm of %) far above the
-    others, or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units none is
-    marked. Raises ValueError for arguments that fit no unit, FileNotFoundError if a source matches no file,
+    others, or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units, none is
+    marked. Raises ValueError for arguments that do not suit any unit, FileNotFoundError if a source matches no file,
     workers.SchedulerError, an OSError, for an unusable scheduler.
     """
     extras.require_fit("identify_batch")
@@ -244,7 +245,7 @@ def _jobs(
 
 
 def _expanded(source: str) -> list[Path]:
-    """The files that a path, a folder or a pattern stands for, sorted."""
+    """The files that a path, a folder or a pattern refers to, sorted."""
     path = Path(source)
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]
@@ -303,7 +304,7 @@ def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
 
 
 def _kept(folder: Path, job: _Job) -> Unit | None:
-    """The unit as finished by an earlier call; None if it was not, or if anything has changed since.
+    """The unit as finished by an earlier call; None if it was not finished or if anything has changed since.
 
     Raises OSError, ValueError or RecursionError for notes not written by this package.
     """

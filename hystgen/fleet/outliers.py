@@ -17,14 +17,14 @@ BEYOND = 3.5
 """Modified z-score beyond which a unit is an outlier."""
 
 FEWEST = 8
-"""[units] With fewer, a median absolute deviation means little, and no unit is marked."""
+"""[units] With fewer units, a median absolute deviation means little, and no unit is marked."""
 
 SAME = 1e-6
-"""Relative spread below which units count as equal: rounding of written digits and different solvers change less."""
+"""Relative spread below which units count as equal; rounding of written digits and different solvers cause less."""
 
 MATTERS, MATTERS_ERROR = 0.05, 0.2
-"""[share of the median] An outlier differs from the median by at least the first, and an error exceeds it by at least
-the second: in a tight fleet, units score high for differences that nobody would act on."""
+"""[fraction of the median] An outlier differs from the median by at least the first fraction, and an outlying error
+exceeds it by at least the second: in a tight fleet, units score high for differences that nobody would act on."""
 
 LEAST_ERROR = 1e-6
 """Held-out errors below this, in %, come from rounding of the written digits."""
@@ -32,8 +32,8 @@ LEAST_ERROR = 1e-6
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure by which units are compared: its name in words and its column. An `error` is compared by its logarithm,
-    and only high values count."""
+    """A figure to compare units by: name in words and column. Of an `error`, the logarithm is compared, and only high
+    values count."""
 
     words: str
     column: str

@@ -1,7 +1,7 @@
-"""Fitting units elsewhere: in processes of this machine (joblib), or on the workers of a Dask cluster.
+"""Fitting units in other processes: on this machine (joblib) or on the workers of a Dask cluster.
 
-A task carries the bytes of its records and a result the text of its files, so a worker needs the package but neither
-the records nor the output folder.
+A task contains the bytes of its records, and a result the text of its files, so a worker needs the package but access
+to neither the records nor the output folder.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ LOST = "the Dask scheduler was lost; the same command resumes from here"
 DIED = "the process that fitted this unit kept dying; is there too little memory for its records?"
 
 PATIENCE = 15.0
-"""[s] Time allowed for a scheduler to answer, and then for it to have a worker."""
+"""[s] Time allowed for a scheduler to answer, and again for it to get a worker."""
 
 IDLE = 30.0
 """[s] Time after which an idle process ends."""
 
 WATCH = 1.0
-"""[s] Interval at which a process checks that its parent is still there."""
+"""[s] Interval at which a process checks that its parent is still alive."""
 
 
 class SchedulerError(OSError):
@@ -66,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True)
 class UnitResult:
-    """The result of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
+    """The result of a task: text of the parameter file, C files by name, figures; `message` describes the failure."""
 
     unit: str
     message: str = ""
@@ -185,7 +185,7 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
     """Results in order of completion, from `jobs` processes (1: from this one); tasks are taken as needed.
 
     A process that dies takes the whole pool down with it. The units in progress are then repeated one by one: only a
-    unit that dies again on its own has failed, and the rest continue.
+    unit whose process dies again has failed, and the others continue.
     """
     with writing.temporary() as folder:
         yield from _pooled(tasks, jobs, work, str(folder))
@@ -230,7 +230,7 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the libraries of a cluster from logging tracebacks of errors that we report in one line."""
+    """Keep the cluster libraries from logging tracebacks of errors that we report in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
     before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
     for logger in before:
@@ -244,7 +244,7 @@ def _quiet() -> Iterator[None]:
 
 @contextlib.contextmanager
 def cluster(address: str) -> Iterator[Client]:
-    """A client of the Dask scheduler at `address`, once that has a worker. Raises SchedulerError."""
+    """A client of the Dask scheduler at `address`, once the scheduler has a worker. Raises SchedulerError."""
     try:
         from distributed import Client
     except ModuleNotFoundError:
@@ -276,7 +276,7 @@ async def _answer(address: str) -> None:
 def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> Generator[UnitResult, None, None]:
     """Results in order of completion, from the workers of a Dask scheduler.
 
-    Only as many tasks as the workers soon need are in flight, so that few records are in memory. Dask repeats the tasks
+    Only as many tasks are in flight as the workers need next, so that few records are in memory. Dask repeats the tasks
     of a dying worker; a unit that keeps killing workers counts as failed. Raises SchedulerError.
     """
     from distributed import as_completed

@@ -39,10 +39,11 @@ MODELS = (*gpi.KINDS, "auto")
 """Values of the option `model`, fixed by the contract."""
 
 P0_FLOOR = 0.05
-"""Share of the sum of weights below which p_0 is raised if the data allow it."""
+"""Fraction of the sum of weights below which p_0 is raised if the data allow it."""
 
 NEAR_ZERO = 0.01
-"""[share of the drive range] The farthest from 0 that a loading curve may start, and the farthest it may fall back."""
+"""[fraction of the drive range] Largest distance from 0 of a loading curve's start, and largest fall within the
+curve."""
 
 PASSES = 60.0
 """Approximate number of passes through all samples in the search for a front, for the progress bar."""
@@ -51,11 +52,11 @@ MOST_PLAYS = 1000
 """Maximum number of plays; the memory used by a fit grows with the square of their number, its time with the cube."""
 
 MOST_BREAKS = 64
-"""Maximum number of breaks of a dead-zone sum, eight times as many as are tried by default."""
+"""Maximum number of breaks in a dead-zone sum, eight times as many as are tried by default."""
 
 BEYOND = 0.1
-"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a share of that range; farther out
-every model is a guess."""
+"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a fraction of that range; farther
+out, every model is a guess."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -88,16 +89,16 @@ def identify(
       Each record gets a free offset.
     - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest of
       them whose held-out error is within 3 % of the best.
-    - `thresholds`: the number of plays without r_0, or a list of thresholds (if there is a memoryless part, in terms of
-      its output; that part preserves the length of the drive range and the position of 0); by default both number and
+    - `thresholds`: the number of plays without r_0, or a list of thresholds (with a memoryless part, in terms of its
+      output; that part preserves the length of the drive range and the position of 0); by default both number and
       thresholds are chosen by blocked validation on the records.
     - `breaks`: the number of points at which a dead-zone sum may bend, or their drives; by default chosen the same way.
-    - `holdout`: records that decide nothing except which model `auto` takes, and whether `gpi-tanh` has one branch or
-      two. Without them, the held-out figures are those of a trial model on the last quarter of each record, which it
-      has not seen; the model written is then fitted to everything.
+    - `holdout`: records that affect only the choice of the model by `auto` and of one or two branches for `gpi-tanh`.
+      Without them, a trial model is fitted without the last quarter of each record, which gives the held-out figures;
+      the model written is then fitted to everything.
     - `history`: drive values visited before every record, starting from the virgin state. Without it, the start of each
-      record is ignored until the drive has wiped the memory that matters; if that leaves less than half of the record,
-      its start memory is estimated together with the weights.
+      record is ignored until the drive has wiped the relevant memory; if less than half of the record remains, its
+      start memory is estimated together with the weights.
     - `rest`: pause after the history in seconds; it changes nothing, since a PI model does not depend on time.
     - `name`: C identifier of the model.
     - `units`: `input` and `output`, by default those of the first record that gives any; columns in other units of the
@@ -108,9 +109,10 @@ def identify(
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
     - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
-    The start memory in the parameter file is the one that `history` leads to. Without a history it is 0, as in a virgin
-    actuator, since no record shows the state in which the firmware will find it. Raises RecordError for unusable files,
-    IdentificationError for records to which no model can be fitted, ValueError and TypeError for wrong arguments.
+    The start memory in the parameter file is the memory after `history`. Without a history it is 0, as in a virgin
+    actuator, since no record shows the actuator's state when the firmware starts. Raises RecordError for unusable
+    files, IdentificationError for records to which no model can be fitted, ValueError and TypeError for wrong
+    arguments.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 2.0, 2001)
@@ -211,13 +213,13 @@ def check_options(
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:
-        raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
+        raise ValueError(f"p0_floor must be a fraction of the sum of weights, from 0 to below 1, not {p0_floor}")
     return how, before
 
 
 @dataclass(frozen=True)
 class _Tried:
-    """A model of one kind, the courses it was fitted to, the held-out courses, and its errors on them."""
+    """A model of one kind, the courses it was fitted to, the held-out courses, and the errors on these."""
 
     fitted: FittedModel
     compared: list[Course]
@@ -237,8 +239,7 @@ def auto(courses: Sequence[Course], held: Sequence[Course]) -> FittedModel:
 
 
 def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: gpi.How) -> _Tried:
-    """Fit one kind to courses and compare it with held-out ones, which choose if `gpi.to_judge` returns several
-    fits."""
+    """Fit one kind to courses and compare it with held-out courses, which choose among fits of `gpi.to_judge`."""
     found = gpi.to_judge(courses, kind, how)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
@@ -268,8 +269,7 @@ def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Cours
 def _choose(tried: Sequence[_Tried]) -> int:
     """Index of the first, and so the simplest, model whose held-out error is close to the smallest.
 
-    Samples whose drive lies far outside the fitted range do not count unless there are no others, since every model is
-    a guess there.
+    Samples far outside the fitted drive range, where every model is a guess, count only if there are no others.
     """
     found = [_rms_inside(each) for each in tried]
     enough = MODEL_PARSIMONY * min(found)
@@ -277,8 +277,8 @@ def _choose(tried: Sequence[_Tried]) -> int:
 
 
 def _rms_inside(tried: _Tried) -> float:
-    """Held-out rms error over samples whose drive is within `BEYOND` of the fitted range; over all samples if those are
-    few."""
+    """Held-out rms error over samples whose drive is within `BEYOND` of the fitted range; over all if few are
+    inside."""
     low, high = _drive(tried.compared)
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
     if all(low <= np.min(each.course.v) and np.max(each.course.v) <= high for each in tried.errors):
@@ -293,7 +293,7 @@ def _rms_inside(tried: _Tried) -> float:
 
 
 def _drive(courses: Sequence[Course]) -> tuple[float, float]:
-    """Least and largest drive of all courses."""
+    """Smallest and largest drive of all courses."""
     ranges = [item.drive_range for item in courses]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
@@ -319,10 +319,10 @@ def _checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[flo
         return None
     if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool):
         if not 0 <= wanted <= MOST_PLAYS:
-            raise ValueError(f"thresholds is a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
+            raise ValueError(f"thresholds must be a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
         return int(wanted)
     if isinstance(wanted, str | float | bool):
-        raise ValueError("thresholds is a whole number of plays or a list of thresholds")
+        raise ValueError("thresholds must be a whole number of plays or a list of thresholds")
     places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
     if not places or places[0] != 0.0:
         places = (0.0, *places)
@@ -341,10 +341,10 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         )
     if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
         if not 1 <= breaks <= MOST_BREAKS:
-            raise ValueError(f"breaks is a number from 1 to {MOST_BREAKS}, not {breaks}")
+            raise ValueError(f"breaks must be a number from 1 to {MOST_BREAKS}, not {breaks}")
         return int(breaks)
     if isinstance(breaks, str | float | bool):
-        raise ValueError("breaks is a whole number or a list of drive values")
+        raise ValueError("breaks must be a whole number or a list of drive values")
     places = tuple(x for x in arguments.numbers("breaks", breaks, "[-20, 20]") if x != 0.0)
     if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("breaks must be finite, strictly increasing drive values, with at least one besides 0")
@@ -354,7 +354,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: gpi.How
 ) -> tuple[list[ErrorRow], str, list[pi.FreeRunErrors], str]:
-    """Rows of models fitted to the first part of each record and compared with the remainder, the kind they select, its
+    """Rows of models fitted to the first part of each record and compared with the remainder, the kind selected, its
     errors, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
@@ -458,7 +458,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 
 def identifier_from(text: str) -> str:
-    """A C identifier made from any text, such as a file's stem; `stage` if no usable character is left."""
+    """A C identifier made from any text, such as a file's stem; `stage` if no usable character remains."""
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"

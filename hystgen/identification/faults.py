@@ -1,4 +1,4 @@
-"""Faults in a recording that must not reach a fit: isolated wrong samples, gaps, and bad stretches of the output.
+"""Find recording faults that must not reach a fit: isolated wrong samples, gaps, and bad stretches of the output.
 
 Samples that are not compared have no `y` (NaN) in a course; their drive still runs through the plays.
 """
@@ -26,17 +26,17 @@ OUTLYING = 8.0
 """[standard deviations of the scatter] An outlier is farther than this from the running median."""
 
 LITTLE = 5e-4
-"""Least scatter assumed, as a share of the peak-to-peak output: a model of a simulation has hardly any error except at
-kinks, and an error of `OUTLYING` times this in a single sample spoils no fit."""
+"""Smallest scatter assumed, as a fraction of the peak-to-peak output: a model of a simulation has almost no error
+except at kinks, and an error of `OUTLYING` times this in a single sample does not spoil a fit."""
 
 WINDOW = 15
 """[samples] Length of the running median, more than twice `LONGEST`."""
 
 AROUND, CLEAR = 6, 2.5
-"""An outlier jumps away and back by more than `CLEAR` times the steps of the `AROUND` samples on either side."""
+"""An outlier jumps away and back by more than `CLEAR` times the steps between the `AROUND` samples on either side."""
 
 AT_ONCE = 0.7
-"""Each of an outlier's two jumps covers at least this share of its distance from the line between its neighbours."""
+"""Each of an outlier's two jumps covers at least this fraction of its distance from the line between its neighbours."""
 
 TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and its value for a normal distribution with standard deviation 1."""
@@ -45,20 +45,20 @@ STEP, STEP_OF_RANGE = 3.0, 0.02
 """A step of the drive exceeds `STEP` times the quantile `TAIL` of its moves, and `STEP_OF_RANGE` times its range."""
 
 MOST_OUTLIERS = 0.01
-"""Largest share of samples that may be rejected as outliers; if there are more, they are not outliers."""
+"""Largest fraction of samples that may be rejected as outliers; if more lie far out, they are not outliers."""
 
 FEW = 2
-"""Number of samples that may be rejected in a record of any length: its first and its last one."""
+"""Number of samples that may be rejected in a record of any length: the first and the last."""
 
 LONG_GAP = 25.0
 """[median steps] In a gap longer than this, the drive, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
-"""The output responds to a pulse of the drive if it moves by this share of the expected motion, and by this number of
+"""The output responds to a pulse of the drive if it moves by this fraction of the expected motion and by this many
 standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs that lie outside all others by this many times their range are wrong, unless the drive is far out as well."""
+"""Outputs outside the range of all others by this many times that range are wrong unless the drive is too."""
 
 
 def most(samples: int) -> int:
@@ -69,8 +69,8 @@ def most(samples: int) -> int:
 def outliers(error: Array, v: Array, swing: float) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is never flagged.
 
-    `swing`: peak-to-peak output; errors far below it do no harm. Samples at a step of the drive `v` (N,) do not count,
-    since a model without a lag or a resonance misses them.
+    `swing`: peak-to-peak output; errors far below `swing` do no harm. Samples at a step of the drive `v` (N,) do not
+    count: a model without a lag or a resonance cannot predict them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
@@ -108,14 +108,13 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
 
 def _scatter(sizes: Array, faulty: int) -> float:
     """Standard deviation of a normal distribution that matches the median or the tail of `sizes` without the `faulty`
-    largest, whichever is larger: a model that misses sharp corners has wide tails, and so has a drive with corners."""
+    largest, whichever is larger: errors at sharp corners have wide tails, and so does a drive with corners."""
     tail = float(np.quantile(np.sort(sizes)[:-faulty], TAIL)) / NORMAL_TAIL
     return max(1.4826 * float(np.median(sizes)), tail)
 
 
 def _stepped(v: Array) -> Flags:
-    """Samples around a step of the drive that is far larger than nearly all others, and a sizeable part of its
-    range."""
+    """Samples around a step of the drive that is far larger than nearly all others and a sizeable part of its range."""
     step = np.abs(np.diff(v))
     found = np.zeros(len(v), dtype=bool)
     for k in np.flatnonzero(step > max(STEP * float(np.quantile(step, TAIL)), STEP_OF_RANGE * float(np.ptp(v)))):
@@ -124,8 +123,7 @@ def _stepped(v: Array) -> Flags:
 
 
 def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
-    """The smaller of the jumps to and from samples [first, last), and their distances from the line between their
-    neighbours.
+    """The smaller of the jumps to and from samples [first, last), and their distances from their neighbours' line.
 
     At either end of a record there is only one jump.
     """
@@ -138,7 +136,7 @@ def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
 def _stands_out(x: Array, first: int, last: int) -> bool:
     """Whether samples [first, last) jump away and back abruptly, by far more than the signal moves around them.
 
-    The tip of a triangle does not, nor does a move of a few samples that a model misses.
+    The tip of a triangle does not count, nor does a move of a few samples that a model misses.
     """
     jump, away = _jump(x, first, last)
     if jump < AT_ONCE * float(np.max(away)):
@@ -153,8 +151,8 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
 def wrong_drive(v: Array, y: Array) -> Flags:
     """Isolated samples of the drive that jump away and back without a response of the output (NaN: unknown).
 
-    A real pulse of the drive shows in the output, at once or a little later; a pulse that does not is a fault of the
-    recording. At either end of a record there is only one jump. Numbers that stand for "no value" always count.
+    A real pulse of the drive shows in the output, at once or a little later; a pulse without a response is a recording
+    fault. At either end of a record there is only one jump. Placeholders for "no value" always count as wrong.
     """
     found = no_value(v)
     known = np.isfinite(y)
@@ -179,8 +177,8 @@ def wrong_drive(v: Array, y: Array) -> Flags:
 def pulses(v: Array) -> list[tuple[int, int]]:
     """Short runs [first, last) of the drive that jump away and back, or stand apart at an end.
 
-    They may be real, or rows that are entirely wrong: zeros, another sample's numbers, a saturated converter. Empty if
-    there are so many that they must be part of the drive.
+    They may be real pulses or entirely wrong rows: zeros, another sample's numbers, a saturated converter. The list is
+    empty if there are so many that they must be part of the drive.
     """
     span = _span(v)
     found = [(first, last) for first, last, _ in _pulses(v, span)] if span > 0.0 and len(v) > WINDOW else []
@@ -188,9 +186,9 @@ def pulses(v: Array) -> list[tuple[int, int]]:
 
 
 def returns(v: Array, first: int, last: int) -> bool:
-    """Whether the drive leaves its course at samples [first, last), by a sizeable part of its range, and comes back.
+    """Whether the drive departs from its course at samples [first, last) by a sizeable part of its range, and returns.
 
-    At an end, where it cannot come back, it has to stand out as well.
+    At an end of the record, where the drive cannot come back, it must stand out as well.
     """
     _, away = _jump(v, first, last)
     if first == 0 or last == len(v):
@@ -208,7 +206,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     # a single sample that stands apart makes three of these second differences large
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
-    # of the steps around the two jumps, at most `LONGEST` + 1 belong to the pulse, and two to another one
+    # of the steps around the two jumps, at most `LONGEST` + 1 belong to this pulse and two to another pulse
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="mirror")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
@@ -225,7 +223,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 
 
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
-    """How far the output leaves the line through its surroundings at samples [first, last) and soon after.
+    """Largest distance of the output from the line through its surroundings at samples [first, last) and soon after.
 
     `follows`: the motion of the output expected without the pulse, which does not count as a response.
     """
@@ -235,7 +233,7 @@ def _notice(follows: Array, y: Array, first: int, last: int) -> float:
 
 
 def _bent(x: Array) -> float:
-    """How far samples lie from the line between the first and the last known ones."""
+    """Distance of samples from the line between the first and the last known samples."""
     known = np.flatnonzero(np.isfinite(x))
     if len(known) < 2:
         return 0.0
@@ -244,7 +242,7 @@ def _bent(x: Array) -> float:
 
 
 def wrong_output(v: Array, y: Array) -> Flags:
-    """Outputs that stand for "no value", and outputs out of all proportion while the drive is not."""
+    """Placeholders for "no value" in the output, and outputs far outside the others' range while the drive is not."""
     found = no_value(y)
     known = np.flatnonzero(~found)
     if len(known) < WINDOW:
@@ -256,8 +254,7 @@ def wrong_output(v: Array, y: Array) -> Flags:
 
 
 def smooth(record: Record) -> Record:
-    """The record with straight lines across samples that are obviously wrong even without a model, for judging it as a
-    whole."""
+    """The record with straight lines across obviously wrong samples, for checks of the whole record without a model."""
     assert record.y is not None
     v, y = record.v, np.asarray(record.y, dtype=np.float64)
     wrong = wrong_output(v, y)
@@ -266,14 +263,14 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie outside the range of all but the outermost samples by more than `times` that range."""
+    """Samples outside the range of all but the outermost samples by more than `times` that range."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
 
 
 def _ends(x: Array) -> tuple[float, float]:
-    """Least and largest sample, ignoring as many outermost ones as may be isolated faults."""
+    """Smallest and largest sample, ignoring as many of the outermost as may be isolated faults."""
     x = np.sort(x)
     return float(x[min(most(len(x)), len(x) // 2)]), float(x[max(len(x) - 1 - most(len(x)), len(x) // 2)])
 
@@ -325,23 +322,23 @@ def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
 
 
-# Stretches of the output: drop-outs, held samples, a saturated converter -------------------------------------
+# Stretches of the output: drop-outs, held samples, converter saturation --------------------------------------
 
 
 FEWEST_HELD = 6
-"""Minimum number of equal samples in a row, while the drive moves, that count as held."""
+"""Minimum number of consecutive equal samples, while the drive moves, that count as held."""
 
 CHANCE = 1e-6
-"""A run of equal samples counts as held only if it occurs in the record by chance with less than this probability."""
+"""A run of equal samples counts as held only if the probability of such a run by chance in the record is below this."""
 
 RAIL = 12
-"""Minimum number of samples in a row, exactly at the end of the output's range, that count as saturated."""
+"""Minimum number of consecutive samples, exactly at the end of the output's range, that count as saturated."""
 
 SHARP, USUAL = 8.0, 0.98
 """A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
 
 SWINGS = 0.4
-"""A step is part of a swing if all but one of the steps next to it exceed this share of it."""
+"""A step is part of a swing if all but one of its neighbouring steps exceed this fraction of it."""
 
 LONGEST_DROP_OUT = 200
 """[samples] Longest drop-out, though never more than a twentieth of the record."""
@@ -350,7 +347,7 @@ SHORT = 3
 """[samples] Shorter drop-outs count as isolated samples, which the fit itself leaves out."""
 
 MOVES_ON = 0.01
-"""[share of its range] Least distance that the drive continues outwards while the output is stuck at the end of a
+"""[fraction of its range] Minimum distance that the drive continues outwards while the output is stuck at the end of a
 converter's range."""
 
 SUDDEN = 4.0
@@ -364,12 +361,11 @@ NEAR = 4
 converter repeats its codes."""
 
 NOISE_FREE = 1e-9
-"""Noise below this share of the output's range is rounding: the record is a simulation, in which backlash also repeats
-a number."""
+"""Noise below this fraction of the output's range is rounding: in a simulation, backlash also repeats values."""
 
 
 def sensitivity(y: Array, v: Array) -> float:
-    """Robust sensitivity: the interquartile range of the output over that of the drive."""
+    """Robust sensitivity: the interquartile range of the output divided by that of the drive."""
     spread = float(np.subtract(*np.quantile(v, (0.75, 0.25))))
     return float(np.subtract(*np.quantile(y, (0.75, 0.25)))) / spread if spread > 0.0 else 0.0
 
@@ -377,7 +373,7 @@ def sensitivity(y: Array, v: Array) -> float:
 def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
     """Runs [a, b) in which the output steps away, stays there and steps back, while the drive does not.
 
-    Ringing takes several steps. `y`: NaN in samples that are not compared.
+    Ringing does not count, since it takes several steps. `y`: NaN at samples that are not compared.
     """
     known = np.flatnonzero(np.isfinite(y))
     if len(known) < 100:
@@ -409,7 +405,7 @@ def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
 
 
 def held(y: Array, v: Array) -> list[tuple[int, int]]:
-    """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps explain."""
+    """Runs [a, b) of equal outputs while the drive moves on, too long to be due to noise and converter steps."""
     step = np.diff(y)
     same = step == 0.0
     runs = [(a, b) for a, b in runs_of(same) if b - a + 1 >= FEWEST_HELD]
@@ -435,7 +431,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
             around = np.concatenate([same[max(a - NEAR * (b - a), 0) : a], same[b : b + NEAR * (b - a)]])
             likely = max(chance, float(np.mean(around))) if len(around) else chance
             wrong = likely ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
-        else:  # a sound coarse converter also repeats codes, but then moves on by a single one
+        else:  # a sound coarse converter also repeats codes, but then moves on by a single code
             wrong = moved > GRAINS * grain and catches_up
         if wrong:
             found.append((a, b + 1))
@@ -443,8 +439,8 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
 
 
 def rails(y: Array, v: Array) -> list[tuple[str, float]]:
-    """Ends of the output's range at which many samples in a row are equal while the drive moves on outwards, with their
-    levels.
+    """Ends of the output's range, with levels, where many consecutive samples are equal while the drive moves on
+    outwards.
 
     An end reached and left by a step does not count, since that is a drop-out; nor does an end at which the drive just
     turns, since that is backlash or a coarse converter.

@@ -1,4 +1,4 @@
-"""A fitted model: its figures, its predictions, its parameter file, and the samples compared."""
+"""A fitted model with its figures, predictions and parameter file, and the samples compared."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 
 
 HELD_OUT = 0.25
-"""Share of each record, at its end, held out for the figures if no held-out record is given."""
+"""Fraction of each record, at its end, held out for the figures if no held-out record is given."""
 
 
 @dataclass(frozen=True, repr=False)
 class Fit:
-    """A fitted model and how good it is.
+    """A fitted model and its quality.
 
-    `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: what the user should know, one sentence
-    each; `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
+    `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: for the user, one sentence each;
+    `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
     `history`: drive values visited before each record, None if unknown; `records`: the records of `used`, in that
     order; `draw`: makes the figure of `plot`, None if there is nothing to draw.
     """
@@ -67,7 +67,7 @@ class Fit:
         return Model(self.parameters)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A picture: a record's loop (held-out if possible) with the model's loop; residuals over time; weights.
+        """A figure: a record's loop (held-out if possible) with the model's loop; residuals over time; weights.
 
         Returns a matplotlib Figure, which a notebook displays; it is also saved to `path`, a .png or .svg file, if
         given. Needs matplotlib, from the extra `plot`. Raises PlotError, OSError.
@@ -86,8 +86,8 @@ class Fit:
         """Free-run output (N,) of the model along a record's drive, in output units.
 
         The start memory comes from `history`, or else from the history of the fit; without either, the plays start at
-        rest at the first drive value, so samples before the drive has swept its range mean little. `free_offset` shifts
-        the result to the mean of the record's `y`. Warns if the drive leaves the fitted range.
+        rest at the first drive value, so the output is unreliable until the drive has swept its range. `free_offset`
+        shifts the result to the mean of the record's `y`. Warns if the drive leaves the fitted range.
         """
         (data,) = in_units([_read(record)], self.parameters.units, sources=[record])
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
@@ -105,9 +105,8 @@ class Fit:
     def along(self, record: Record, used: Used) -> NDArray[np.float64]:
         """Free-run output (N,) along a record, computed as in the fit.
 
-        The drive is bridged where the fit bridged it; every part between gaps starts afresh and has the free offset
-        that fits its compared samples best; parts that were left out are NaN. Raises ValueError if `used` belongs to
-        another record.
+        The drive is bridged where the fit bridged it; every part between gaps starts afresh, with the offset that fits
+        its compared samples best; parts left out are NaN. Raises ValueError if `used` belongs to another record.
         """
         if (record.name, len(record)) != (used.name, used.samples) or record.y is None:
             raise ValueError(f"{record.name} is not the record {used.name} of {used.samples} samples that was compared")
@@ -154,7 +153,7 @@ class Fit:
         return dump_parameters(self.parameters, comments, "\n".join(lines))
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the parameter file, all or nothing."""
+        """Write the parameter file completely or not at all."""
         write_atomically(path, self.text())
 
     def _interval_sentence(self) -> str:
@@ -214,12 +213,13 @@ Indices = NDArray[np.intp]
 class Used:
     """How a fit used one record; arrays are ascending indices into its samples.
 
-    `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
-    last sample (exclusive) of each part that was run, a single part if there is no gap; `starts`: the start memory
-    found for each part, None if it was given or not found; `skipped`: excluded at the start on request; `ignored`: not
-    compared at the start of a part because its start memory is unknown; `outliers`: isolated samples of y not compared;
-    `stretches`: samples of y not compared in drop-outs, held runs or converter saturation; `bridged`: samples of v
-    replaced by a straight line; `gaps`: first sample after each gap; `left_out`: parts between gaps too short to use.
+    `name`: the record's name; `held_out`: whether the record took no part in the fit; `samples`: its length; `parts`:
+    first and last sample (exclusive) of each part that was simulated, a single part if there is no gap; `starts`: the
+    start memory found for each part, None if it was given or not found; `skipped`: samples excluded at the start on
+    request; `ignored`: samples not compared at the start of a part because its start memory is unknown; `outliers`:
+    isolated samples of y not compared; `stretches`: samples of y not compared in drop-outs, held runs or converter
+    saturation; `bridged`: samples of v replaced by a straight line; `gaps`: first sample after each; `left_out`: parts
+    between gaps too short to use.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Fitting a play sum with a memoryless part in front of it.
 
-The front's shape and the weights are found together (`joint`); then the plays are placed and weighted as for a plain
-play sum, on the drive behind the front (`pi`), and both are refined once more.
+The front's shape and the weights are found together (`joint`). Thresholds and weights are then chosen as for a plain
+play sum, with the front's output as the drive (`pi`), and shape and weights are refined once more.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be fitted; `auto` chooses among them."""
 
 BREAK_COUNTS = (1, 2, 4, 8)
-"""Numbers of breaks of a dead-zone sum that are tried."""
+"""Numbers of breaks tried for a dead-zone sum."""
 
 FRONT_PARSIMONY = 1.02
 """A front with fewer shape parameters is chosen if its validation error is within this factor of the best."""
@@ -36,13 +36,13 @@ INVERSE_PLAYS = 10
 """Number of plays of the measured output in the convex problem that starts the search for a dead-zone sum."""
 
 LEAST_SLOPE = 0.1
-"""Least slope of a piece of the front, and of the inverse play sum, in that problem, as a share of the mean slope."""
+"""Smallest slope of a front's piece, and of the inverse play sum, in that problem, as a fraction of the mean slope."""
 
 
 @dataclass(frozen=True)
 class How:
     """The options of a fit: `wanted`, the number or the thresholds of plays, and `breaks`, None to let the records
-    decide; `floor`: least share of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
+    decide; `floor`: smallest fraction of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
 
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
@@ -75,18 +75,18 @@ class FittedModel:
 def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, list[Course]]:
     """Fit a model of one kind; also returns the courses as they were compared, with the measured drive.
 
-    Of several fronts of a kind, the one chosen has the fewest shape parameters among those whose error on blocks left
-    out of the fit is close to the smallest. Raises IdentificationError.
+    Among the fronts of a kind whose error on blocks left out of the fit is close to the smallest, the front with the
+    fewest shape parameters is chosen. Raises IdentificationError.
     """
     return _solved(courses, kind, how, lambda found: [_by_blocks(found)])[0]
 
 
 def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[FittedModel, list[Course]]]:
-    """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
+    """The fits of one kind between which held-out records decide, the simplest first; otherwise the same as `solve`.
 
-    There are several only for tanh envelopes, with one branch and with two: two branches form a loop of their own, as
-    wide for a small amplitude as for a large one. Records of a single amplitude do not show whether their loop is of
-    that kind, and neither do blocks left out of them.
+    Several fits are returned only for tanh envelopes, with one and with two branches: two branches form a loop of their
+    own, as wide for a small amplitude as for a large one. Records of a single amplitude, and blocks left out of them,
+    do not show whether their loop is of that kind.
     """
 
     def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
@@ -122,7 +122,7 @@ def _solved(
     plain, compared = pi.solve(courses, how.wanted, how.floor, how.tick)
     if kind == "pi":
         return [(FittedModel(Kept(), np.empty(0), plain), compared)]
-    # without the front the wrong plays would be chosen: search the shape with a dense list of plays
+    # without the front, the wrong plays would be chosen: search for the shape with a dense list of plays
     fine = plain.thresholds
     if not isinstance(how.wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
@@ -140,13 +140,13 @@ def _finished(
     front, shape = found.front, found.shape
     courses = start.needed(courses, front.stages(shape, DIGITS), how.wanted)
     fitted = _solve_behind(courses, front, shape, how)
-    # the plays may have moved: find the best shape for them again
+    # the thresholds may have changed: find the best shape for them again
     r = fitted.solution.thresholds
     shape = joint.refine(compared, front, shape, r, how.tick).shape
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # a front does not change the sense
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # the same with a front
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -200,12 +200,12 @@ def validation(shaped: joint.LocalFit, front: Front) -> float:
 
 
 def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
-    """Shape of a dead-zone sum from a problem that is linear in the sum and the inverse play sum together.
+    """Shape of a dead-zone sum from a problem that is linear in both the sum and the inverse play sum.
 
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
     with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
-    lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output enters the
-    plays, so its solution is only a starting point for the fit of the output. None if no sample is left.
+    lies behind the plays). The problem is convex, but it minimises an error of the drive, and noise of the output
+    enters the plays, so its solution is only a starting point for the fit of the output. None if no sample remains.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])

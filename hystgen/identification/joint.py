@@ -1,8 +1,8 @@
-"""The shape of a front and the weights of the plays fitted together: least squares on the free-run output error.
+"""Joint fit of a front's shape and the plays' weights: least squares on the free-run output error.
 
 The weights enter linearly, the shape does not. The method is Gauss-Newton with a trust region; every step solves for
 all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives with
-respect to the shape are differences of free runs, and so include the effect of earlier samples through the plays.
+respect to the shape are differences between free runs, so they include the effect of earlier samples through the plays.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ FLATTEST = 3.0
 """Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
 
 CURVED = (0.02, 3.0)
-"""Least and largest half drive range in units of the tanh's argument."""
+"""Smallest and largest half drive range in units of the tanh's argument."""
 
 
 class Front(Protocol):
-    """A family of memoryless parts, with one member for every `shape` (m,)."""
+    """A family of memoryless parts with parameters `shape` (m,)."""
 
     @property
     def name(self) -> str:
-        """Its name in the fit table."""
+        """The front's name in the fit table."""
 
     @property
     def straight(self) -> Array:
@@ -65,7 +65,7 @@ class Front(Protocol):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of every shape parameter."""
+        """Smallest and largest value of every shape parameter."""
 
     def slack(self, shape: Array) -> Array:
         """Values that must not be negative for the front to be invertible, in addition to the bounds; may be empty."""
@@ -78,7 +78,7 @@ class Front(Protocol):
 
 
 class _Bounded:
-    """Fronts that rise everywhere within their bounds."""
+    """Fronts that are increasing everywhere within their bounds."""
 
     def slack(self, shape: Array) -> Array:
         """No further constraints."""
@@ -159,8 +159,7 @@ class DeadZones(_Bounded):
 class Ends(_Bounded):
     """A limiter: a straight line that becomes flatter near the ends of the drive range, made of two dead zones (41).
 
-    The shape is the length of each flatter end, as a share of the range, and the logarithm of the ratio of the outer
-    slope to the inner one.
+    The shape is the length of each flatter end, as a fraction of the range, and the logarithm of outer to inner slope.
     """
 
     drive: tuple[float, float]
@@ -173,11 +172,11 @@ class Ends(_Bounded):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """A length may be so small that it has no effect; the two bends do not meet."""
+        """A length may be so small that it has no effect; the two bends must not meet."""
         return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
 
     def widest(self, shape: Array) -> float:
-        """The length of the longer flatter end, as a share of the range."""
+        """The length of the longer flatter end, as a fraction of the range."""
         return float(np.max(shape[:2]))
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
@@ -227,7 +226,7 @@ class Tanh:
 
     The shape of a branch is `a1` times half the drive range, and the position of its steepest point, measured from the
     middle of the range in units of half its length. The descending branch has two more parameters: the logarithm of its
-    height relative to the ascending branch, and its lift above that branch at mid-range, as a share of the range.
+    height relative to the ascending branch, and its lift above that branch at mid-range, as a fraction of the range.
     """
 
     drive: tuple[float, float]
@@ -255,10 +254,9 @@ class Tanh:
         return np.array(low), np.array(high)
 
     def slack(self, shape: Array) -> Array:
-        """Distances of the ends from where a branch becomes flat, and of the descending branch above the ascending
-        one."""
+        """Distances of the ends from a branch's flat part, and of the descending branch from the ascending one."""
         held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
-        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, with no height left
+        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, with zero height
             held += [-1.0] * len(self._places)
         elif self.branches == 2:
             stage = self._stage(shape, None)
@@ -314,7 +312,7 @@ def _numbers(values: Sequence[float], digits: int | None) -> list[float]:
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
-    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved a little."""
+    """`count` breaks evenly spaced inside the drive range; a break that would fall on 0 is moved slightly."""
     low, high = drive
     step = (high - low) / (count + 1)
     return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
@@ -330,9 +328,8 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 
 
 DIFFERENCE = 2.0**-16
-"""Change of a shape parameter for a derivative; shape parameters are of the order of one. A search needs only a few
-digits of a derivative: this leaves five before the curvature shows, and eleven digits of the output above the rounding
-of doubles."""
+"""Change of a shape parameter for a derivative; shape parameters are of order one. A search needs only a few digits of
+a derivative: here curvature affects the sixth digit, and the output keeps eleven digits above rounding."""
 
 MOST_STEPS = 25
 """Maximum number of steps of a search. For `examples/stage_recording.csv`, fronts take 2 to 10."""
@@ -343,7 +340,7 @@ DAMPING = 1e-3
 ENOUGH = 0.005
 """[mean square error] The search ends when a step lowers the sum of squared errors by less than this.
 
-Moving an estimate by one of its standard deviations changes the sum by one mean square error.
+Moving an estimate by one standard deviation changes the sum by one mean square error.
 """
 
 LEAST_CHANGE = 1e-8
@@ -388,7 +385,7 @@ class LocalFit:
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input in place of the drive and of the history."""
+    """The course as the plays see it: their input replaces the drive and the history."""
     if not stages:
         return item
     rising, visited = _session(item, stages)
@@ -426,7 +423,7 @@ class Limits(Protocol):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of every shape parameter."""
+        """Smallest and largest value of every shape parameter."""
 
     def slack(self, shape: Array) -> Array:
         """Values that must not be negative, in addition to the bounds."""
@@ -443,8 +440,8 @@ def search(
     """The best shape near that of `now`, and the damping with which the search would continue.
 
     `linear` linearises the system about a shape and weights. `little`: the search also ends after a step that lowers
-    the error by less than this share. Failed steps count towards `most`, and increase the damping of the next step. The
-    search ends before a step for which the linear system predicts an improvement below `ENOUGH`.
+    the error by less than this fraction. Failed steps count towards `most`, and increase the damping of the next step.
+    The search ends before a step for which the linear system predicts an improvement below `ENOUGH`.
     """
     shape = now.shape
     low, high = limits.bounds
@@ -480,11 +477,12 @@ def search(
 
 
 def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
-    """A solution of a linear system, rounded to what the records determine; `sizes`: lengths of the system's columns.
+    """A solution of a linear system, rounded to the digits that the records determine; `sizes`: lengths of the system's
+    columns.
 
     The rounding units are powers of two, at most `most`. The last bits from linear algebra libraries differ between
-    processors, and a search that carried them along from step to step could end in another minimum; with rounding, its
-    steps are the same everywhere.
+    processors; carried from step to step, they could lead a search to another minimum. With rounding, its steps are the
+    same everywhere.
     """
     rounded = found.copy()
     known = (sizes > 0.0) & (rms > 0.0)
@@ -527,7 +525,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and the changes in their weighted sum with the other versions."""
+    """The plays behind the first version of a front, and the change in their weighted sum with each other version."""
     carried = []
     for stages in versions:
         rising, visited = _session(course, stages)

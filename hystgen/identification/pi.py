@@ -1,4 +1,4 @@
-"""Fitting a PI model to records: positions, number and weights of the plays.
+"""Fitting a PI model to records: thresholds, number and weights of the plays.
 
 The weights solve a non-negative least-squares problem on the triangular system of `reduction`, from which the free
 offsets have been projected out, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974,
@@ -26,11 +26,11 @@ DIGITS = 10
 """Significant digits of offsets and of the parameters of a front: more than a record determines."""
 
 WEIGHT_DIGITS = 8
-"""Significant digits of weights. Where plays move alike, the tie break below leaves a singular value of a millionth,
-through which the last bits of the linear algebra library reach the tenth digit; two more are dropped for safety."""
+"""Significant digits of weights. Where plays move in nearly the same way, the tie break below leaves a singular value
+of a millionth, through which the linear algebra library's last bits reach the tenth digit; two more are dropped."""
 
 DUST = 1e-9
-"""A weight below this share of their sum is rounding, not a play."""
+"""A weight below this fraction of the sum of weights is rounding error, not a play."""
 
 FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
@@ -47,15 +47,15 @@ class IdentificationError(ValueError):
 class Sense:
     """How the output moves with the drive.
 
-    `falls`: it goes down when the drive goes up; `clockwise`: loops run in the opposite direction to those of plays,
-    and weights of either sign explain the records clearly better than positive ones.
+    `falls`: the output goes down when the drive goes up; `clockwise`: loops run in the opposite direction to a play's
+    loops, and weights of either sign explain the records clearly better than positive weights.
     """
 
     falls: bool
     clockwise: bool
 
     def sentences(self, plays: int) -> list[str]:
-        """What the user should know, one sentence each; `plays`: number of plays in the fitted model."""
+        """Warnings for the user, one sentence each; `plays`: number of plays in the fitted model."""
         found = [FALLING] if self.falls else [CLOCKWISE] if self.clockwise else []
         return [*found, NO_PLAYS] if plays == 0 else found
 
@@ -64,7 +64,8 @@ class Sense:
 class Solution:
     """A fitted play sum.
 
-    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: the records' sense.
+    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: how the recorded
+    output moves with the drive.
     """
 
     thresholds: Array
@@ -100,7 +101,7 @@ def solve(
         lists = [ThresholdList(wanted)]
     else:
         wide = once(courses, reach)
-        if wanted is not None and len(wide) > wanted // 2:  # too few of the wanted plays would be left
+        if wanted is not None and len(wide) > wanted // 2:  # too few of the requested plays would remain
             wide = ()
         count = None if wanted is None else wanted - len(wide)
         lists = candidates(reach, sum(item.used for item in courses), count)
@@ -142,38 +143,38 @@ def compare(item: Course, r: Array, p: Array) -> FreeRunErrors:
     return FreeRunErrors(item, offset, error - offset)
 
 
-# Direction of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its
-# loops run counterclockwise: the output is higher on the way down than on the way up. The direction of recorded loops
-# is determined from the recording alone, because fitted weights do not show it: a saturating output needs negative
-# weights even if its loops run counterclockwise.
+# Direction of the output and of its loops. A play sum with positive weights rises with its drive, and its loops run
+# counterclockwise: the output is higher on the way down than on the way up. The direction of recorded loops is
+# determined from the recording alone, because fitted weights do not show it: a saturating output needs negative weights
+# even if its loops run counterclockwise.
 
 
 CLEARLY = 0.9
-"""[share of the rms error] Another explanation of a record is clearly better if its error is below this."""
+"""[fraction of the rms error] Another explanation of a record is clearly better if its error is below this."""
 
 SENSED_PLAYS = 8
-"""Number of plays in the fit with weights of either sign: with many more, the weights of neighbours cancel."""
+"""Number of plays in the fit with weights of either sign: with many more, the weights of neighbouring plays cancel."""
 
 SENSED_RANK = 1e-6
-"""Share of the largest singular value below which the records do not determine a combination of plays."""
+"""Fraction of the largest singular value below which the records do not determine a combination of plays."""
 
 LEAST_TURN = 0.05
-"""[share of the drive's range] A smaller reversal belongs to the leg that it interrupts: noise of the drive, dither."""
+"""[fraction of the drive's range] A smaller reversal (noise, dither) belongs to the leg that it interrupts."""
 
 LEVELS = 32
-"""Number of points of a leg, each the mean of a group of samples, and of drives at which two legs are compared."""
+"""Points per leg, each the mean of a group of samples, and drive values at which two legs are compared."""
 
 SIGMAS = 4.0
 """[standard deviations] Loops have a direction if their width differs from zero by more than this: none of 60 straight
-lines and saturating curves with noise does. Set by: tests/test_start.py TestDirection."""
+lines and saturating curves with noise exceeds it. Set by: tests/test_start.py TestDirection."""
 
 ONE_WAY = 0.5
-"""[share of the area between the legs] Least net area of loops that have a direction: the wings of a butterfly run in
-opposite directions and cancel. Set by: tests/test_start.py TestDirection."""
+"""[fraction of the area between the legs] Smallest net area of loops that have a direction: the wings of a butterfly
+run in opposite directions and cancel. Set by: tests/test_start.py TestDirection."""
 
 SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
-"""[share of the time] The slowest turns that take up each share are tried in order; turns that are at most a twentieth
-faster are included. Set by: tests/test_start.py TestDirection."""
+"""[fraction of the time] The slowest turns that take up each fraction are tried in order; turns that are at most a
+twentieth faster are included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
     "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
@@ -190,7 +191,8 @@ NO_PLAYS = "no hysteresis was found: the model has no play besides r_0, and its 
 
 
 def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:
-    """The sense of reduced records; `squares`: the sum of squared errors left by positive weights."""
+    """How the output of reduced records moves with the drive; `squares`: the sum of squared errors with positive
+    weights."""
     together = sum(_covaried(item) for item in courses if item.used)
     some = np.unique(np.linspace(0, len(reduced.thresholds) - 1, SENSED_PLAYS + 1).astype(int))
     matrix, target = reduced.whole[:, some], reduced.whole[:, -1]
@@ -208,7 +210,7 @@ def _covaried(item: Course) -> float:
 def runs_clockwise(courses: Sequence[Course]) -> bool:
     """Whether the recorded loops enclose their area clockwise, beyond what noise, drift and lags can produce.
 
-    A lag in either signal adds a width that vanishes with the speed, so the slowest turns that show a direction decide.
+    A lag in either signal adds a width that vanishes at low speed, so the slowest turns with a clear direction count.
     """
     turns = sorted((turn for item in courses for turn in _turns(item)), key=lambda turn: turn.speed)
     spent = np.cumsum([abs(turn.later) for turn in turns])
@@ -225,8 +227,8 @@ def _direction(turns: Sequence[_Turn], both: bool) -> int:
     both at the top and at the bottom.
 
     The width of a loop, the output of the downward leg minus that of the upward leg, is taken as proportional to the
-    span of drive that both share. A drift adds as much to it after a turn at the top as it takes away after one at the
-    bottom, and is fitted as well.
+    drive range that both legs cover. A drift widens loops after a turn at the top by as much as it narrows them after a
+    turn at the bottom, and is fitted as well.
     """
     width = np.array([np.mean(turn.widths) for turn in turns])
     later = np.array([turn.later for turn in turns])
@@ -254,10 +256,10 @@ def _deviation(error: Array, noise: Array, row: Array) -> float:
 
 @dataclass(frozen=True)
 class _Turn:
-    """The two legs of the drive on either side of a turning point, over the `span` of drive that they share.
+    """The two legs of the drive on either side of a turning point, over the drive range `span` that both cover.
 
-    `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: samples by which the way down is
-    later; `deviation`: standard deviation of the mean width due to the noise of the output.
+    `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: delay of the way down in samples;
+    `deviation`: standard deviation of the mean width due to the noise of the output.
     """
 
     span: float
@@ -292,7 +294,7 @@ def _turns(item: Course) -> Iterator[_Turn]:
 
 
 def _corners(v: Array) -> list[int]:
-    """First sample, turning points and last sample of the legs of a drive; fewer than three if there is no turn.
+    """First sample, turning points and last sample of a drive's legs; fewer than three samples if there is no turn.
 
     A play with half of `LEAST_TURN` as threshold ignores smaller moves, and last moved where the drive turned.
     """
@@ -322,21 +324,22 @@ def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[A
 
 
 LEAST_TRAVEL = 0.15
-"""The largest play still moves over this share of the drive's peak-to-peak range.
+"""The largest play still moves over this fraction of the drive's peak-to-peak range.
 
-A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, the play's weight depends only on
-the last few samples before each reversal and can take any value, yet it takes full effect once the drive becomes
-slightly larger. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much
-drive as the gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with r_n = 0.9.
+A play of threshold r moves over `p-p - 2 r` in a settled loop. As this motion goes to zero, the play's weight depends
+only on the last few samples before each reversal and can take any value, yet it takes full effect once the drive
+becomes slightly larger. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as
+much drive as the gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with r_n =
+0.9.
 """
 
 LEAST_VISIBLE = 0.05
-"""The same for a play that only just moves visibly, at the ends of the range.
+"""The same fraction for a play that only just moves visibly, at the ends of the range.
 
 The diagnosis fits plays up to this limit, since otherwise the movement of wider plays could be mistaken for an effect.
-So does a fit to records with an unknown start that show such a play: without it, the held-out error was 1.4 to 1.6
-times that with a known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to
-39); with it, 1.2.
+A fit to records with an unknown start does the same if they show such a play: in one of ten plants whose drive grew in
+both directions, the held-out error without it was 1.4 to 1.6 times the error with a known start; with it, 1.2 times
+(`benchmarks/start_memory.py`, seeds 20 to 39).
 """
 
 COUNTS = (6, 8, 12, 16, 24)
@@ -373,10 +376,10 @@ class ThresholdList:
 def largest(courses: Sequence[Course], least: float = LEAST_TRAVEL) -> float:
     """The largest threshold whose play moves far enough in the record that moves it most.
 
-    `least`: the distance that is far enough, as a share of the drive's range.
+    `least`: the distance that is far enough, as a fraction of the drive's range.
 
-    A play moves less the larger its threshold, so bisection finds the largest one; nothing is assumed about the
-    waveform, and a first loading from a known start counts like any other move.
+    Bisection finds it, since a play moves less the larger its threshold; nothing is assumed about the waveform, and a
+    first loading from a known start counts like any other move.
     """
     found = 0.0
     for course in courses:
@@ -393,7 +396,7 @@ def largest(courses: Sequence[Course], least: float = LEAST_TRAVEL) -> float:
 
 
 def loop_reach(swing: float, least: float = LEAST_TRAVEL) -> float:
-    """The largest threshold of a play that moves over the share `least` of the drive's range in a settled loop."""
+    """The largest threshold of a play that moves over the fraction `least` of the drive's range in a settled loop."""
     return 0.5 * (1.0 - least) * swing
 
 
@@ -411,7 +414,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Thr
         counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
     lists = []
     for n in counts:
-        # a single play has only one possible threshold; with very many the spacing does not matter
+        # a single play has only one possible threshold; with very many plays, the spacing does not matter
         for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(ThresholdList((0.0, *places)))
@@ -424,7 +427,7 @@ def dense(reach: float, samples: int, most: int = DENSE) -> ThresholdList:
 
 
 def written(weights: Array) -> Array:
-    """Weights as written to a parameter file: rounded, and 0 if only rounding is left."""
+    """Weights as written to a parameter file: rounded, and 0 if they are only rounding error."""
     p = np.array([rounded(float(x), WEIGHT_DIGITS) for x in weights])
     p[p < DUST * float(np.sum(p))] = 0.0
     return p
@@ -466,24 +469,24 @@ def choose(reduced: Reduced, lists: Sequence[ThresholdList]) -> ThresholdList:
     )
 
 
-# Weights of a play sum, and the floor under p_0 --------------------------------------------------------------
+# Weights of a play sum, and the floor for p_0 ----------------------------------------------------------------
 
 
 Columns = NDArray[np.intp]
 
 STILL = 1e-9
-"""A column shorter than this share of the first, or of the longest in its unit, is rounding: its play does not move."""
+"""A column shorter than this fraction of the first, or of the longest in its unit, is rounding: its play rests."""
 
 TIE = 1e-12
-"""Weight of the tie break between solutions that fit equally well, as a share of the squared output.
+"""Weight of the tie break between solutions that fit equally well, as a fraction of the squared output.
 
-If the drive stays between a few turning points, several plays move alike, and rounding decides how they share their
-weight. The tie break takes the solution with the least sum of squares. A play whose movement differs from all others by
-a thousandth keeps its weight to about six digits.
+If the drive stays between a few turning points, several plays move in the same way, and rounding decides how the weight
+is divided among them. The tie break chooses the solution with the smallest sum of squares. A play whose movement
+differs from all others by a thousandth keeps its weight to about six digits.
 """
 
 FLOOR_COST = 0.05
-"""[share of the rms error] The error may grow by this much for p_0 to be raised to its floor."""
+"""[fraction of the rms error] The error may grow by this much for p_0 to be raised to its floor."""
 
 
 def non_negative(system: Array, columns: Columns) -> Array:
@@ -499,8 +502,7 @@ def _least_squares(matrix: Array, target: Array) -> Array:
     length = float(np.linalg.norm(target))
     weights = np.zeros(len(size))
     if moving.any() and length > 0.0:
-        # scaled to length one, so that the solution does not depend on units and the solver's absolute tolerance is
-        # suitable
+        # scaled to length one, which makes the solution independent of units and suits the solver's tolerance
         n = int(np.count_nonzero(moving))
         unit = np.concatenate([matrix[:, moving] / size[moving], math.sqrt(TIE) * np.eye(n)])
         scaled, _ = nnls(unit, np.concatenate([target / length, np.zeros(n)]), maxiter=100 * n)
@@ -517,7 +519,7 @@ def residual(system: Array, columns: Columns, weights: Array) -> float:
 class Weights:
     """Result of `fit_weights`: the weights, their rms error, and whether p_0 was raised.
 
-    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None if it was not.
+    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None if it was not raised.
     """
 
     p: Array
@@ -527,13 +529,13 @@ class Weights:
 
 
 def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
-    """Weights for the chosen plays, with p_0 at least the share `floor` of their sum if the data allow it.
+    """Weights for the chosen plays, with p_0 at least the fraction `floor` of their sum if the data allow it.
 
-    p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,
-    smallest travel, where a slight lag of sensor or amplifier already flattens the loop and drives the least-squares
-    p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. That result is used if
-    the rms error grows by at most 5 %, since the data then hardly determine p_0. Otherwise the smaller p_0 belongs to
-    the actuator (series backlash for p_0 = 0: no inverse) and is kept.
+    The inverse divides by p_0, the slope just after a reversal. A record shows that slope only over the first, smallest
+    travel after a reversal, where even a slight lag of sensor or amplifier flattens the loop and drives the
+    least-squares p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. The result
+    is used if the rms error grows by at most 5 %, since the data then hardly determine p_0. Otherwise the smaller p_0
+    is a property of the actuator (series backlash for p_0 = 0: no inverse) and is kept.
     """
     matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
 
@@ -543,7 +545,7 @@ def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
     free = _least_squares(matrix, target)
     if len(free) < 2 or free[0] >= floor * float(np.sum(free)):
         return Weights(free, rms(free))
-    # with p_0 = q_0 + share * sum of the others, all >= 0, the bounded problem is another non-negative one
+    # with p_0 = q_0 + share * sum of the others, all >= 0, the bounded problem is again a non-negative one
     share = floor / (1.0 - floor)
     bounded_matrix = matrix.copy()
     bounded_matrix[:, 1:] += share * matrix[:, :1]
@@ -561,8 +563,8 @@ RIDGE = 1e-7
 """Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
 
 INFEASIBLE = 1e-10
-"""If the dual problem's solution is closer than this to its target, of length 1, the rest is rounding: the target is
-reached, so no point satisfies all inequalities (Farkas)."""
+"""If the dual problem's solution is closer than this to its target, of length 1, the difference is rounding error: the
+target is reached, so no point satisfies all inequalities (Farkas)."""
 
 
 class InfeasibleError(ValueError):
@@ -573,8 +575,8 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
     """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
 
     `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own; the
-    others have that of the target. If the matrix does not determine x, the result is the x with the least norm after
-    multiplying each entry by the length of its column. Raises InfeasibleError.
+    other columns have the target's unit. If the matrix does not determine x, the result is the x with the least norm
+    after multiplying each entry by the length of its column. Raises InfeasibleError.
 
     Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor turns the problem into
     that of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.

@@ -1,7 +1,7 @@
-"""Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
+"""Records prepared for a fit: cut at gaps, faults in the drive bridged, wrong samples of the output left out.
 
-Faults that show without a model are found when a course is made, before any fit; isolated samples that lie far from a
-first, robust fit to their neighbours are found after that fit.
+Faults that show without a model are found when a course is made, before any fit; isolated samples far from a first,
+robust fit to their neighbours are found after that fit.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from hystgen.records import LARGEST, SHORTEST, Record, no_value
 Array = NDArray[np.float64]
 
 LEAST_SOUND = 0.1
-"""Least share of a record that must remain once the samples at the ends of a converter's range are removed."""
+"""Smallest fraction of a record that must remain once the samples at the ends of a converter's range are removed."""
 
 MOST_FITS = 4
-"""Maximum number of robust fits; they end as soon as one finds the same faults as the one before."""
+"""Maximum number of robust fits; they end as soon as a fit finds the same faults as the previous one."""
 
 LESS_MISSED = 0.25
-"""The drive, not the output, is wrong if bridging it reduces the squared error to less than this share."""
+"""The drive, not the output, is wrong if bridging it reduces the squared error to less than this fraction."""
 
 
 LEAST_MOVEMENT = 1e-20
-"""A smaller motion of drive or output cannot be a measurement: its squares, and its ratio to the other motion, fall
+"""A smaller motion of drive or output cannot be a measurement: its square, or its ratio to the other motion, falls
 outside the range of double precision and of parameter files."""
 
 
@@ -64,7 +64,7 @@ def courses(
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LONG_GAP:g} steps; what the drive did in them is unknown, so each part starts anew"
+            f"{faults.LONG_GAP:g} steps; the drive in these gaps is unknown, so each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
@@ -79,8 +79,8 @@ def samples_in(record: Record, seconds: float) -> int:
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it enters a fit: without the start where the memory is unknown; isolated faults that need no model
-    to be found are bridged (drive) or left out (output).
+    """The record as it enters a fit: without the start where the memory is unknown, and with isolated faults that can
+    be found without a model bridged (drive) or left out (output).
 
     Raises IdentificationError for a record that a fit cannot use.
     """
@@ -123,7 +123,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
     """The course without the samples at the ends of a converter's range; name, level and number of samples of each end.
 
-    Raises IdentificationError if hardly anything remains.
+    Raises IdentificationError if too few samples remain.
     """
     levels = faults.rails(item.y, item.v)
     if not levels:
@@ -139,7 +139,7 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
 
 
 def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
-    """The course without drop-outs and held samples, and where these are."""
+    """The course without drop-outs and held samples, and the positions of these."""
     found = []
     for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
@@ -156,7 +156,7 @@ def _less(item: Course, wrong: NDArray[np.bool_]) -> Course:
 
 
 def _without_stretches(item: Course) -> tuple[Course, list[str]]:
-    """The course without the samples of y in stretches that are plainly wrong, and a sentence about each kind."""
+    """The course without the samples of y in plainly wrong stretches, and a sentence about each kind."""
     left, ends = without_rails(item)
     reported = [
         f"{item.name}: {counted(number, 'sample')} of y at the limit of the converter, the {name} value {level:.6g}, "
@@ -179,11 +179,11 @@ def mask_outliers(
 ) -> None:
     """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
-    This includes the start, since only the final fit decides how much of it is compared. If it is the drive that is
-    wrong, it is bridged. Pulses of the drive take no part in the first fit, which then decides whether they are real: a
-    false one could make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van
-    Driessen, Data Mining and Knowledge Discovery 12, 2006): it is refitted without the samples with the largest errors,
-    as many as may be rejected, so that none of them attracts it.
+    The start is examined too, since only the final fit decides how much of it is compared. A wrong drive is bridged.
+    Pulses of the drive are left out of the first fit, which then decides whether they are real: a false pulse could
+    make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van Driessen, Data Mining
+    and Knowledge Discovery 12, 2006): it is refitted without the samples with the largest errors, as many as may be
+    rejected, so that none of them attracts it.
     """
     first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
     solution, _ = pi.solve(first, wanted, floor)
@@ -215,14 +215,14 @@ def _without_pulses(item: Course) -> Course:
 
 
 def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
-    """The course with its drive bridged at isolated samples that the output does not confirm.
+    """The course with its drive bridged at isolated samples to which the output does not respond.
 
     A sample of the drive is wrong if bridging it makes the model's error there far smaller and no larger elsewhere: a
-    wrong drive stays in the memory, a wrong output does not. It is also wrong if the whole row is, which shows in the
-    output at that row or later: a real pulse would have left its mark in the memory. A pulse right before the end of a
+    wrong drive stays in the memory, a wrong output does not. It is also wrong if the whole row is wrong, which the
+    output shows at that row or later: a real pulse would have changed the memory. A pulse right before the end of a
     record counts as a fault: it does not help a fit, and would only widen the range and hide when the memory became
-    known. With a `robust` solution the largest and the least drive are also tested if the errors there are among the
-    largest: such drives set the model's range, and the samples that they spoil may hide them.
+    known. With a `robust` solution, the largest and the smallest drive are also tested if the errors there are among
+    the largest: such drives set the model's range, and the samples that they spoil may hide them.
     """
     error = _errors(item, solution)
     far = faults.far_from_others(error, item.output_range)
@@ -246,7 +246,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
 
 def _neither(error: Array, less: Array) -> bool:
-    """Whether outputs lie further from the predictions with and without a pulse of the drive than these two lie apart,
+    """Whether outputs lie farther from the predictions with and without a pulse of the drive than these two lie apart,
     so that neither following the drive nor lagging behind it explains them."""
     known = np.isfinite(error)
     nearer = np.minimum(np.abs(error[known]), np.abs(less[known]))
@@ -265,7 +265,7 @@ def _not_remembered(error: Array, less: Array) -> bool:
         return False
     scatter = math.sqrt(float(np.mean(usual**2)))
     effect = error - less
-    # wrong outputs say nothing about the drive
+    # wrong outputs carry no information about the drive
     here = (np.abs(effect) > scatter) & (np.abs(less) <= usual[-1])
     error, less, effect = error[here], less[here], effect[here]
     sure = _size(effect) > (faults.OUTLYING * scatter) ** 2

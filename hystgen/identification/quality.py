@@ -1,4 +1,4 @@
-"""How good a fit is: the fit table, confidence intervals, and warnings."""
+"""Quality of a fit: the fit table, confidence intervals and warnings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ErrorRow:
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples`: number compared; `ignored`: number not
     compared; `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest
     peak-to-peak output compared in any of the row's records, the 100 % of `rms_percent` and `max_percent`; both rows of
-    a trial have the same.
+    a trial have the same range.
     """
 
     part: str
@@ -126,7 +126,7 @@ FEWEST_BLOCKS, MOST_BLOCKS = 40, 4000
 """Minimum number of blocks, however long the residuals' correlation, and maximum: more do not improve the intervals."""
 
 MANY_WEIGHTS = 100
-"""With more weights than this, zero weights stay zero in every redraw, so that one factorisation serves all."""
+"""With more weights than this, zero weights stay zero in every redraw, so that one factorisation serves all redraws."""
 
 MEMORY = 4.0
 """[correlation times of the residuals] Length of a block."""
@@ -135,16 +135,17 @@ SEED = 1
 """Seed of the random numbers, so that the same records give the same intervals."""
 
 UNKNOWN = 1e-9
-"""Singular values below this share of the largest belong to directions that the records do not determine, in which
-nothing is redrawn: seven digits then agree between linear algebra libraries, and four are shown."""
+"""Singular values below this fraction of the largest belong to directions that the records do not determine; weights
+are not redrawn in these. Results then agree to seven digits between linear algebra libraries, and four are shown."""
 
 
 @dataclass(frozen=True)
 class Intervals:
-    """95 % intervals, and the redraws from which they come.
+    """95 % intervals, and the redraws that they come from.
 
-    `weights`: low and high end for each weight; `width`: for the widest loop; `held_out`: for the held-out rms error,
-    None if nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples per block.
+    `weights`: lower and upper end for each weight; `width`: for the widest loop; `held_out`: for the held-out rms
+    error, None if nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples per
+    block.
     """
 
     weights: tuple[tuple[float, float], ...]
@@ -163,9 +164,9 @@ class Intervals:
 def intervals(
     fitted: FittedModel, courses: Sequence[Course], errors: Sequence[FreeRunErrors], held: Sequence[FreeRunErrors]
 ) -> Intervals:
-    """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
+    """Intervals of a fit to `courses` (drive as measured) with residuals `errors`; `held`: errors of held-out records.
 
-    The residuals of a hysteresis model are coloured: model errors recur at every reversal. They are therefore not
+    The residuals of a hysteresis model are coloured: model errors recur at every reversal. Residuals are therefore not
     redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
     score `X_b^T e_b`; random signs of all scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
     Association 105, 2010, 218-235) redraw the record, and the weights of each redraw are found under the constraints of
@@ -287,7 +288,7 @@ AMPLIFIES = 100.0
 """Ratio of the largest slope to p_0 above which a warning says that the inverse amplifies small movements."""
 
 SMALL_REACH = 0.1
-"""Largest threshold, as a share of the drive range, below which a warning says that records show little hysteresis."""
+"""A largest threshold below this fraction of the drive range causes a warning that records show little hysteresis."""
 
 
 def about_model(
@@ -354,7 +355,7 @@ def about_start(errors: FreeRunErrors, largest: float) -> str:
         return ""
     return (
         f"{item.name}: the output of the first {counted(end, 'sample')}, which depends on the history, is off by "
-        f"{start:.3g} rms against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out "
+        f"{start:.3g} rms against {rest:.3g} for the rest; the history may be wrong. Leave it out "
         "if in doubt"
     )
 
@@ -370,7 +371,7 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
                 else:
                     alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out, but also fitted{alike}, so it tests nothing; leave it out of "
+                        f"{record.name}: held out, but also fitted{alike}, so it is no test; leave it out of "
                         "one of the two"
                     )
                 break

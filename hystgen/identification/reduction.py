@@ -1,13 +1,13 @@
-"""From records to a small triangular system, which is all that a fit needs, however many samples there are.
+"""Reduce records to a small triangular system that contains everything a fit needs, whatever the number of samples.
 
-The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
-samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
-2012, A206-A239), so that memory does not grow with samples times thresholds.
-The column of ones comes first: the rows below the first are then the system with the offset projected out exactly.
+The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. The plays are computed for a few
+thousand samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci.
+Comput. 34, 2012, A206-A239), so that memory use does not grow with samples times thresholds. The column of ones comes
+first: the rows below the first are then the system with the offset projected out exactly.
 
-While the same plays follow a move, each of them is the drive plus a constant, and the others do not move, so all plays
-are linear in the drive. However many samples such a segment has, two rows hold all that least squares can learn about
-its plays, and one number holds the part of y that no play can follow.
+As long as the same plays follow the drive, each of them is the drive plus a constant, and the others do not move, so
+all plays are linear in the drive. However many samples such a segment has, two rows contain all information for least
+squares about its plays, and one number contains the part of y that no play can follow.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ CHUNK = 8192
 """Number of samples reduced at a time."""
 
 BLOCKED = 64
-"""Number of columns for which the linear algebra library gets work space at a time."""
+"""Number of columns processed at a time in the linear algebra library's work space."""
 
 AS_FAR = 1e-3
-"""[share of its range] A drive that comes within this of its largest or least value counts as having reached it: four
-codes of a 12-bit converter. The error for plays with larger thresholds is no more than this share of the motion."""
+"""[fraction of its range] A drive that comes within this of its largest or smallest value counts as having reached it:
+four codes of a 12-bit converter. For plays with larger thresholds, the error is at most this fraction of the motion."""
 
 FOLDS = 4
 """Number of consecutive blocks of each record for the blocked validation."""
@@ -43,9 +43,9 @@ FOLDS = 4
 class StartMemory:
     """A start memory found by a fit (`start`).
 
-    `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units; `once`: threshold of a play that leaves this memory
-    but is so wide that it hardly moves back in the record, None if there is none.
+    `turns`: drive values that bring virgin plays to it; `uncertainty`: half the width of the 95 % interval of the
+    memory's contribution to the output at the first sample, output units; `once`: threshold of a play that has moved
+    away from this memory but is too wide to move back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]
@@ -55,13 +55,13 @@ class StartMemory:
 
 @dataclass(frozen=True)
 class Course:
-    """The samples of one record in a fit: drive and output from the record's start, compared over [first, last).
+    """One record's samples in a fit: drive and output from the record's start, compared over [first, last).
 
     The drive before `first` also runs through the plays, and so does the drive at samples whose `y` is NaN, which are
     not compared. `history`: drive values visited before the record; None if unknown, and `start` is then the estimated
     memory, if one was searched for. `begin`: first sample that may be compared, regardless of the start memory.
-    `origin`: index of the record it is part of, and index of its first sample in that record. `stretches`: samples
-    whose y was left out as part of a stretch, not as isolated; None if there are none.
+    `origin`: index of the record that the course is part of, and index of the course's first sample in that record.
+    `stretches`: samples of y left out in faulty stretches rather than as isolated ones; None if there are none.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Course:
 
     @property
     def visited(self) -> tuple[float, ...] | None:
-        """Drive values that lead virgin plays to the start memory, known or found; None if there is neither."""
+        """Drive values that bring virgin plays to the start memory; None if that is neither known nor found."""
         return self.start.turns if self.history is None and self.start is not None else self.history
 
     @property
@@ -92,7 +92,7 @@ class Course:
 
     @property
     def drive_range(self) -> tuple[float, float]:
-        """Least and largest drive of the compared samples; if there are none, of all from `first` to `last`."""
+        """Smallest and largest drive of the compared samples; if there are none, of all from `first` to `last`."""
         part = self.v[self.compared] if self.used else self.v[self.first : self.last]
         return float(part.min()), float(part.max())
 
@@ -102,7 +102,7 @@ class Course:
         return float(np.ptp(self.y[self.compared])) if self.used else 0.0
 
     def resettled(self, largest: float) -> Course:
-        """The course, ignoring only as much of its start as plays up to the threshold `largest` require."""
+        """The course, ignoring only as much of its start as necessary for plays up to the threshold `largest`."""
         first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
         return replace(self, first=max(first, self.begin))
 
@@ -110,8 +110,8 @@ class Course:
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:
     """Play states just before the first sample.
 
-    With a history: virgin plays (state 0, as in `simulate`) led through it. Without one: at rest at the first drive
-    value, which is wrong by an unknown amount until the memory has been wiped.
+    With a history: virgin plays (state 0, as in `simulate`) after that history. Without a history: plays at rest at the
+    first drive value, which is wrong by an unknown amount until the memory has been wiped.
     """
     if history is None:
         return np.full(len(thresholds), v[0])
@@ -123,7 +123,7 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
 @functools.lru_cache(maxsize=256)
 def _behind(history: tuple[float, ...], thresholds: bytes) -> Array:
     """Virgin plays after a history; cached, since a search requests the same few again and again."""
-    r = np.frombuffer(thresholds).copy()  # writable: the plays would be compiled again for a read-only array
+    r = np.frombuffer(thresholds).copy()  # writable, since the plays would be compiled again for a read-only array
     return operators.plays(history, r, 0.0)[:, -1]
 
 
@@ -131,8 +131,8 @@ def settled(v: Array, reach: float) -> int:
     """First sample from which an unknown start memory affects the plays only by an offset.
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact. Once it has visited its own largest
-    and least value, plays with larger thresholds never move again in this record: they are constant. The earlier of the
-    two counts. Values within `AS_FAR` of each other count as equal, so that noise does not decide between turns.
+    and smallest value, plays with larger thresholds never move again in this record: they are constant. The earlier
+    sample counts. Values within `AS_FAR` of each other are equal, so that noise does not decide between turns.
     """
     extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
@@ -150,8 +150,8 @@ def _reached(v: Array) -> int:
 def travel(course: Course, threshold: float) -> float:
     """Peak-to-peak movement of one play over the compared samples.
 
-    If they begin before the memory of that play is known, the result is at most its movement in a settled loop over the
-    range of the drive: the rest depends on the start, which is at best estimated.
+    If these begin before the memory of that play is known, the result is at most its movement in a settled loop over
+    the range of the drive: any further movement depends on the start, which is at best estimated.
     """
     start = start_states(course.v, course.visited, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
@@ -162,7 +162,7 @@ def travel(course: Course, threshold: float) -> float:
 
 
 def ways(x: Array) -> tuple[float, float]:
-    """The longest moves up and down of a signal, regardless of turns in between."""
+    """A signal's longest moves up and down, regardless of turns in between."""
     return float(np.max(x - np.minimum.accumulate(x))), float(np.max(np.maximum.accumulate(x) - x))
 
 
@@ -261,7 +261,7 @@ class Reflected:
     factors: Array
 
     def extended(self, columns: Array) -> Array:
-        """The triangular factor of the table with these columns after its own; they are overwritten."""
+        """The triangular factor of the table with these columns appended; they are overwritten."""
         from scipy.linalg import lapack
 
         rank = len(self.factors)
@@ -332,7 +332,7 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
     """Write the rows of the samples whose y is a number into `out`, or none if it has no room; return their number.
 
     Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible, so if a play does not move,
-    neither does any larger one.
+    plays with larger thresholds do not move either.
     """
     wanted = len(out) > 0
     sums[:] = 0.0

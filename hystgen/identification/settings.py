@@ -1,4 +1,4 @@
-"""Settings that a fit keeps from the parameter file it replaces: everything that records do not determine."""
+"""Settings that a fit keeps from the parameter file that it replaces: everything that records do not determine."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate
 class Settings:
     """Settings of an older parameter file.
 
-    `values`: its values for `KEPT_KEYS`; `name` and `units`: used if the user gives none, and records are converted to
-    these units; `effects`: names of its effects, which are dropped along with its weights; `problem`: why nothing could
-    be read.
+    `values`: the file's values for `KEPT_KEYS`; `name` and `units`: used if the user gives none, and records are
+    converted to these units; `effects`: names of the file's effects, which are dropped along with its weights;
+    `problem`: the reason why the file could not be read.
     """
 
     file: str = ""
@@ -46,10 +46,10 @@ class Settings:
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
-        """Sentences about settings kept and dropped; `fit`: without these settings."""
+        """Sentences about settings kept and dropped; `fit`: the fit without these settings."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing is kept of the old file, which is not a parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing kept from the old file, which is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._kept(fit):
             names.insert(0, "units")

@@ -6,8 +6,8 @@ adds the constant `p_i s_i` to the output; after that it no longer depends on th
 piecewise linear in the `d` of every record, which join the weights as further bounded unknowns (the search is in
 `joint`). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
 
-The result is a course's `StartMemory`: drive values that would have left that memory. Like a known history, they have
-the same meaning with any front and any thresholds.
+The result is a course's `StartMemory`: drive values that would have produced that memory. Like a known history, they
+have the same meaning with any front and any thresholds.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 STARTS, UNLIKE = 8, 3.0
-"""Minimum number of samples of a start, and the ratio of its rms error to that of the rest above which the given or
+"""Minimum number of samples of a start, and the ratio of its rms error to the error elsewhere above which the given or
 estimated memory is taken to be wrong."""
 
 ROUNDING = 1e-6
-"""Share of the output range below which errors are only rounding, as in records computed without noise."""
+"""Fraction of the output range below which errors are only rounding, as in records computed without noise."""
 
 LEAST_KNOWN = 0.5
-"""If at least this share of a record's samples has a known memory, the samples before them are left out: a start memory
-fitted to those would flatter the model being judged. This rejects none of 56 simulated records without a history, and
-the median held-out error is 1.00 times that with the true history; with 0.25 it is 1.02 times."""
+"""If the memory is known for at least this fraction of a record's samples, the earlier samples are left out: a start
+memory fitted to them would flatter the model being judged. With 0.5, none of 56 simulated records without a history is
+rejected, and the median held-out error is 1.00 times that with the true history; with 0.25, it is 1.02 times."""
 
 PLAYS = 12
-"""Number of thresholds for which start memories are estimated: the middle of the numbers of plays that default fits
-try. Given thresholds are used instead if there are no more than this and the records move their plays; time grows with
-the cube of their number."""
+"""Number of thresholds for which start memories are estimated: the middle one of the numbers of plays that fits try by
+default. Given thresholds are used instead if there are no more than this and the records move their plays; time grows
+with the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """Reciprocal of the standard deviation of a slope that is uniform from -1 to 1."""
@@ -59,13 +59,13 @@ TOGETHER = 6
 """Maximum number of courses that share weights in a search, whose cost grows with the cube of their number."""
 
 ROUNDS = 2
-"""Number of searches; the errors of the first one set the weight of the prior in the next."""
+"""Number of searches; the errors of the first search set the weight of the prior in the next."""
 
 
 def estimated(
     courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None
 ) -> list[Course]:
-    """The courses compared from their beginning, with a start memory for those with an unknown history.
+    """The courses compared from their beginning, with a start memory for each course with an unknown history.
 
     `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
     of that option. The start of a course stays ignored if its errors are far larger than those after it (a transient),
@@ -101,10 +101,10 @@ def needed(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
+    """The courses, with a start memory (`estimated`) for each course with too few comparable samples otherwise.
 
-    `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move; their
-    memory is ignored if waiting for it would leave too little to compare and no start memory is found.
+    `least`: fraction of a course's samples that is enough; `largest`: threshold above which plays hardly move; their
+    memory is ignored if waiting for it would leave too few samples to compare and no start memory is found.
     """
     known = [_enough(item, least, largest) for item in courses]
     short = [lacking(item, least) for item in courses]
@@ -125,7 +125,7 @@ def of_model(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """Courses on which a model is judged: its weights stay fixed, and the starts of courses not `lacking` are ignored.
+    """The courses for judging a model with fixed weights; the starts of courses that are not `lacking` are ignored.
 
     `least`, `largest`: as in `needed`.
     """
@@ -149,8 +149,7 @@ def unknown(item: Course, largest: float = math.inf) -> Course:
 
 
 def _enough(item: Course, least: float, largest: float) -> Course:
-    """The course from where every play is known or, if that leaves too little, from where those up to the threshold
-    `largest` are."""
+    """The course from where every play is known or, if that is too short, every play up to threshold `largest`."""
     exact = unknown(item)
     return exact if exact.used >= least * _whole(item).used else unknown(item, largest)
 
@@ -164,7 +163,7 @@ def findable(item: Course) -> bool:
 
 
 def lacking(item: Course, least: float) -> bool:
-    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found."""
+    """Whether less than a fraction `least` of a course is comparable without a start memory, and one can be found."""
     return findable(item) and unknown(item).used < least * _whole(item).used
 
 
@@ -173,9 +172,9 @@ def _started(
 ) -> list[Course]:
     """The courses with the start memories that were found, except for transients.
 
-    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. It represents all
-    plays that the drive moves only once, on its way beyond its earlier range: an actuator that came from a wider range
-    has such plays.
+    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. The added play
+    represents all plays that the drive moves only once, on its way beyond its earlier range: an actuator that came from
+    a wider range has such plays.
     """
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search.of(inner, r, weights)
@@ -214,7 +213,7 @@ def in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, 
 
 
 def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
-    """Whether the errors of a model before the memory is known are far larger than those after that."""
+    """Whether the errors of a model before the memory is known are far larger than afterwards."""
     known = np.isfinite(item.y)
     if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False
@@ -230,7 +229,7 @@ def memory_of(slopes: Array, r: Array) -> Array:
 
 
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
-    """Drive values that leave virgin plays of thresholds r (n+1,) in an admissible memory (n+1,).
+    """Drive values that bring virgin plays of thresholds r (n+1,) to an admissible memory (n+1,).
 
     As a function of the threshold, the memory left by a history has slopes of -1 and 1 only: going inwards from the
     outermost play, a part that falls with the threshold comes from a turn at `s + r`, a part that rises from a turn at
@@ -268,7 +267,7 @@ class _Bounds:
 
 @dataclass(frozen=True)
 class _System:
-    """One course: the rows from the sample at which no play depends on the start any more, and the samples before."""
+    """One course: the rows from the sample at which no play depends on the start any more, and the earlier samples."""
 
     item: Course
     r: Array
@@ -304,8 +303,7 @@ class _System:
         return [np.zeros(n), np.diff(virgin) / np.diff(self.r), *turned]
 
     def rows(self, slopes: Array, p: Array) -> Array:
-        """Rows `[plays (n+1), change with the slopes.., y]` linearised about these slopes and weights, the offset
-        projected out.
+        """Rows `[plays (n+1), change with the slopes.., y]` linearised about slopes and weights, offset projected out.
 
         A play that has not moved yet is a constant; once it has moved, the output does not depend on its start.
         """
@@ -326,7 +324,7 @@ class _System:
         return table[1:, 1:]
 
     def left(self, slopes: Array, p: Array) -> float:
-        """Root of the sum of squared errors for a memory and weights, found without reducing a table of all plays."""
+        """Root of the sum of squared errors for a memory and weights, without reducing a table of all plays."""
         item, begin = self.item, min(self.item.begin, self.settled)
         states = float(item.v[0]) + memory_of(slopes, self.r)
         output = operators.play_sum(item.v[: self.settled], self.r, states, p)
@@ -404,7 +402,7 @@ class _Search:
         return np.concatenate(shape)
 
     def _left(self, system: _System, slopes: Array) -> float:
-        """The error that a memory leaves on one course, with the best weights for that course unless they are known."""
+        """The residual error with a memory on one course, with its best weights unless weights are known."""
         if self.known is not None:
             return system.left(slopes, self.known)
         alone = replace(self, systems=(system,))

@@ -1,4 +1,4 @@
-"""The digital-to-analogue converter that plays drives: bits, range and coding."""
+"""The digital-to-analogue converter that outputs the drives: bits, range and coding."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ CODINGS = ("straight", "twos-complement")
 """How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
 
 FEWEST_BITS, MOST_BITS = 8, 32
-"""Least and largest number of bits of a converter: with fewer, one code exceeds the margin that drives keep to the ends
-of the range; with more, codes do not fit the C header."""
+"""Smallest and largest number of converter bits: with fewer, one code exceeds the margin between drives and the ends of
+the range; with more, codes do not fit the types of the C header."""
 
 FEWEST_CODES = 100
-"""Least number of codes between the lowest and the highest drive: with fewer, one code exceeds the margin that drives
-keep to the ends of the range."""
+"""Minimum number of codes between the lowest and the highest drive: with fewer, one code exceeds the margin between
+drives and the ends of the range."""
 
 
 @dataclass(frozen=True)
 class Dac:
     """A converter as seen by the drive, including the amplifier.
 
-    `low`: drive at the lowest code; `high`: drive one code above the highest, the data sheet's reference times the
-    gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is written as k, or
-    as k - 2^(bits-1).
+    `low`: drive at the lowest code; `high`: drive one code above the highest, that is, the data sheet's reference
+    voltage times the gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is
+    written as k, or as k - 2^(bits-1).
     """
 
     bits: int
@@ -49,7 +49,7 @@ class Dac:
 
     @property
     def bytes(self) -> int:
-        """Bytes of a code in memory."""
+        """Bytes per code in memory."""
         return 1 if self.bits <= 8 else 2 if self.bits <= 16 else 4
 
     def codes(self, drives: ArrayLike) -> Codes:
@@ -80,7 +80,7 @@ class Dac:
             )
 
     def sentence(self, unit: str, span: float) -> str:
-        """A sentence about its resolution, for drives over `span`; `unit`: the drive's, after a space, or empty."""
+        """A sentence about its resolution, for drives over `span`; `unit`: the drive's unit after a space, or empty."""
         how = "straight binary" if self.coding == CODINGS[0] else "two's complement"
         return (
             f"Drives are codes of a {self.bits}-bit DAC over {self.low:g} to {self.high:g}{unit}, {how}: one code is "
@@ -103,7 +103,7 @@ def wrong_range(low: float, high: float) -> Iterator[str]:
 
 def filled(codes: ArrayLike, every: int) -> Codes:
     """Codes (N,) at every tick, from codes given at every `every`-th tick: the integers nearest to the straight lines
-    between those."""
+    between these codes."""
     nodes = np.asarray(codes, dtype=np.int64)
     steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
     return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])

@@ -10,25 +10,25 @@ from decimal import Decimal
 from hystgen.basics.problems import PlanError
 
 MARGIN = 0.01
-"""[share of the input range] Margin at either end that no record enters."""
+"""[fraction of the input range] Margin at either end of the range that no record enters."""
 
 OF_RATE = 0.98
-"""[share of the rate limit] Fastest rate of a plan, which stays below the limit despite rounding."""
+"""[fraction of the rate limit] Fastest rate in a plan, low enough to stay below the limit despite rounding."""
 
 FULL_SCALE = 8
 """[sample times] Duration of a move over the whole range if no rate limit is given."""
 
 LONGEST_EDGE = 32
-"""[samples] Longest full-scale move at the rate limit; a move that would be longer is sampled less often."""
+"""[samples] Longest full-scale move at the rate limit; a longer move is sampled less often."""
 
 MOVE = 12
 """[samples] Shortest full-scale move of a triangle."""
 
 SLOW = 24.0
-"""[s] Least duration of a slow record."""
+"""[s] Shortest duration of a slow record."""
 
 SLOWER = 1.5
-"""[times] A slow record takes at least this many times as long as a fast one."""
+"""[times] A slow record takes at least this many times as long as a fast record."""
 
 FAST_SAMPLES = 1000
 """[samples] Approximate length of a fast record."""
@@ -74,7 +74,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Tempo:
-    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, and
+    """Times as multiples of the sample time: the sample spacing in `fast` records, the duration of `slow` records, and
     the `rest` between records.
 
     `move`: samples of a full-scale move of the fast triangles.
@@ -89,13 +89,12 @@ class Tempo:
 
     @classmethod
     def of(cls, grid: Grid, max_rate: float, sample_time: float) -> Tempo:
-        """Fast records as fast as sampling and rate allow, slow ones slower. Raises PlanError if a drive would take
-        days."""
+        """The tempo that sampling and rate limit allow. Raises PlanError if a drive would take days."""
         span = grid.high - grid.low
         across = float(span) * 10.0**-grid.digits / (OF_RATE * max_rate * sample_time)
         seconds = max(across, FULL_SCALE) * sample_time
         if not seconds <= LONGEST_MOVE:
-            what = f"one move over the input range takes {seconds:.3g} s, and a plan hundreds of them"
+            what = f"one move over the input range takes {seconds:.3g} s, and a plan has hundreds of moves"
             raise PlanError([f"{what}; give a larger max rate or a shorter sample time"])
         fast = max(1, math.ceil(across / LONGEST_EDGE))
         slow = max(math.ceil(SLOW / sample_time), math.ceil(SLOWER * FAST_SAMPLES * fast))
@@ -107,7 +106,7 @@ class Tempo:
         return float(ticks * Decimal(repr(self.sample_time)))
 
     def every_of(self, share: float, samples: int) -> int:
-        """Sample times between the `samples` of a record that lasts `share` of a slow one."""
+        """Sample times between the `samples` of a record that lasts a fraction `share` of a slow record."""
         return max(self.fast, round(share * self.slow / samples))
 
     @property

@@ -1,4 +1,4 @@
-"""The codes of a session as a C header, for firmware that plays them."""
+"""A session's codes as a C header, for firmware that outputs them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def file(parameters: Parameters) -> str:
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """Indices of the samples between which the drive is straight, from pairs of a number of steps and a step length."""
+    """Indices of samples between which the drive is straight, from pairs of a number of steps and a step length."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 
@@ -33,8 +33,8 @@ def header(
 ) -> str:
     """`NAME_session.h`: the codes between which the drive is straight, and how many samples lie between them.
 
-    `codes`: of all samples; `stretches`: pairs of a number of steps and the samples per step; `words`: command line
-    options of the plan.
+    `codes`: the codes of all samples; `stretches`: pairs of a number of steps and the samples per step; `words`:
+    command line options of the plan.
     """
     name, unit = parameters.name, parameters.units.input
     kind = f"{'' if dac.zero else 'u'}int{8 * dac.bytes}_t"

@@ -1,4 +1,4 @@
-"""Drive records to measure for a diagnosis, in which every effect of the catalogue shows and no two look alike.
+"""Drive records to measure for a diagnosis, which show every effect of the catalogue and tell all of them apart.
 
 >>> planned = hystgen.plan("stage.yaml", max_rate=5000.0)
 >>> planned.write("plan/")
@@ -38,7 +38,7 @@ MEASURED = "measured"
 """Folder for the measured records, next to the drives."""
 
 WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
-"""Files of a session at one rate: its drives, its codes, and where its recording is expected."""
+"""Files of a session at one rate: drives, codes, and the expected path of the recording."""
 
 MOST_SAMPLES = 10_000_000
 """Maximum number of samples in a session at one rate: about 500 MB of text."""
@@ -74,8 +74,8 @@ class PlannedDrives:
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence about each rate or time
-    chosen by default. If a rate was given, all drives are played as one, `whole`, with codes for `dac`; `session` says
-    where the records lie in it, `stretches` lists its numbers of steps between drawn points and ticks per step.
+    chosen by default. If a rate was given, all drives are played as one, `whole`, with codes for `dac`; `session` gives
+    the positions of the records in it, and `stretches` its numbers of steps between drawn points and ticks per step.
     """
 
     parameters: Parameters
@@ -163,7 +163,7 @@ class PlannedDrives:
         return {**made, session.FILE: self.session.to_json()}
 
     def _options(self) -> str:
-        """Command line options that make the same session."""
+        """Command line options that reproduce the session."""
         said = [f"--max-rate {self.max_rate!r}"]
         if self.session is not None:
             said.append(f"--rate {self.session.rate!r}")
@@ -192,9 +192,9 @@ def plan(
     samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range` and below `max_rate`.
 
     `rate`: the sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and all
-    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` describe the
-    converter's codes (see `Dac`); drives are then those that the codes produce, and exceed `max_rate` by no more than
-    one code.
+    drives are parts of one session, with rests between them. `dac_bits`, `dac_range` and `dac_coding` describe the
+    converter's codes (see `Dac`); the drives are then the values that the codes produce, and exceed `max_rate` by no
+    more than one code.
 
     Raises ParameterError, PlanError with every problem.
     """
@@ -283,7 +283,7 @@ def _dac(
         low_high = None
     if bits is not None and low_high is not None:
         return Dac(bits, *low_high, coding)
-    # The given options are still checked
+    # the given options are still checked
     problems += () if bits is None else converter.wrong_bits(bits)
     problems += () if low_high is None else converter.wrong_range(*low_high)
     return None
@@ -291,7 +291,7 @@ def _dac(
 
 @dataclass(frozen=True)
 class _Player:
-    """Plays drives through a converter at one rate: fills the ticks between their samples, and joins them.
+    """Plays drives through a converter at one rate: fills the ticks between their samples and joins the drives.
 
     `nodes`, `every`: the lead-in that establishes the history; `first`: tick at which the first record begins.
     """

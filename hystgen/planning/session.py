@@ -20,8 +20,8 @@ from hystgen.records import Record
 FILE = "session.json"
 
 OFF = 0.05
-"""[share of the drives' span] Distance from the lowest drive at which a record may start and end, to allow for the gain
-and noise of a monitor. In a recording that is out of step with its session, records start and end anywhere."""
+"""[fraction of the drives' span] Distance from the lowest drive within which a record must start and end, which allows
+for a monitor's gain and noise. In a recording that is out of step with its session, records start and end anywhere."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class PlayedRecord:
 class Session:
     """The signal played: `samples` at `rate`, Hz, containing `records`.
 
-    `history`: drives visited before the first record and at the end of each, the highest and the lowest of all; `rest`:
-    pause between records, s; `rise`: time of the first rise through the middle between those two, s from the first
-    sample, used to align a recording; `dac`: the fields of the converter, if there are codes.
+    `history`: drives visited before the first record and at the end of each, the highest and the lowest of all drives;
+    `rest`: pause between records, s; `rise`: time of the first rise through the middle between these two, s from the
+    first sample, used to align a recording; `dac`: the fields of the converter, if there are codes.
     """
 
     rate: float
@@ -82,7 +82,7 @@ class Session:
         return cls(**{**given, "records": parts})
 
     def cut(self, recording: Record) -> tuple[list[Record], list[Record]]:
-        """The records to fit, and the held-out ones, from a recording of the whole session.
+        """The records to fit and the held-out records, cut from a recording of the whole session.
 
         The recording has its own clock, sample rate and start; it is aligned where the drive first rises through the
         middle, which is before the first record. Raises PlanError if it does not fit the session.
@@ -192,7 +192,7 @@ DAC_FIELDS: Mapping[str, Callable[[object], str]] = {
 }
 
 Wrong = tuple[Place, str, bool]
-"""Where a problem is, what it is, and whether it concerns the key rather than its value."""
+"""Position and text of a problem, and whether it concerns the key rather than the value."""
 
 
 def _of_fields(

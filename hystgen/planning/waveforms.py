@@ -21,11 +21,11 @@ EDGE = 4
 """[samples] Shortest move; three samples lie between its ends."""
 
 ROUND = 3
-"""[samples] Length of the average that rounds every drive: a sharper corner would lie unseen between two samples."""
+"""[samples] Length of the average that rounds every drive: sharper corners could fall between two samples."""
 
 
 class Waveform:
-    """A drive being built up in `codes`, sample by sample, from the lowest on; positions are shares of the range.
+    """A drive built up in `codes`, sample by sample, from the lowest drive; positions are fractions of the range.
 
     `pace`: samples of a quick full-scale move.
     """
@@ -43,7 +43,7 @@ class Waveform:
         """A straight move at `pace` samples per full-scale move, in `EDGE` samples or more, within the rate limit.
 
         Then the drive rests, so that two samples remain at the turning point even once corners are rounded: the turning
-        point is then sampled even behind a delay of any fraction of a sample.
+        point is then sampled even if the output is delayed by a fraction of a sample.
         """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)
@@ -57,8 +57,7 @@ class Waveform:
         self.codes += [self.codes[-1]] * samples
 
     def wave(self, values: Sequence[float]) -> None:
-        """A wave about the middle of the range, as large as the range and the rate limit allow, preceded by a move to
-        its start."""
+        """A wave about the middle, as large as the range and the rate limit allow, after a move to its start."""
         steepest = max(abs(b - a) for a, b in itertools.pairwise(values))
         size = 0.5 * (self._grid.high - self._grid.low - 2) / max(map(abs, values))
         size = min(size, (self._step - 1) / steepest)
@@ -212,7 +211,7 @@ class RecordKind:
 
     @property
     def shows(self) -> tuple[str, ...]:
-        """Names of the effects that the record shows, the most clearly shown first."""
+        """Names of the effects that the record shows, the clearest first."""
         shown_by = {name: effects.shapes(name)[0].shown_by for name in effects.CATALOGUE}
         shown_by[effects.BEND] = BEND_SHOWN_BY
         places = {name: records[self.name] for name, records in shown_by.items() if self.name in records}
@@ -289,7 +288,7 @@ RECORDS = (
         _multisine, _fast,
     ),
     RecordKind(
-        "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
+        "reversals", "Random turning points at a medium pace, to judge findings between slow and fast.",
         partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     RecordKind(

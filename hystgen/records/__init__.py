@@ -123,14 +123,14 @@ def read_record(
     """Read one data file, or make a record from samples in memory.
 
     `path`: path of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the
-    order t, v, y. `columns`: maps our column names to the file's (`{"t": "Time"}`). A file's name may be the whole name
-    (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), its last part, or its last part without a
-    unit, as long as it matches only one column; or the column's number, `#2`. `t`, `v` and `y` are found the same way,
-    or else by meaning, if only one column has such a name (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a
-    file without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that must
-    be present. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a drive
-    that moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are dropped
-    with a note, up to 5 % of the record. A time in another unit is converted to seconds.
+    order t, v, y. `columns`: maps our column names to the file's (`{"t": "Time"}`). A column of the file can be given
+    by its whole name (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), by the last part of the
+    name, with or without a unit, if only one column matches; or by its number, `#2`. `t`, `v` and `y` are found the
+    same way, or else by meaning, if only one column has such a name (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds,
+    for a file without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that
+    must be present. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a
+    drive that moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are
+    dropped with a note, up to 5 % of the record. A time in another unit is converted to seconds.
 
     Raises RecordError with every problem in the file.
     """
@@ -146,8 +146,8 @@ def in_units(
     named: tuple[str, Mapping[str, str] | None] = ("units", None),
     sources: Sequence[object] = (),
 ) -> list[Record]:
-    """The records with each column of `need`, and temperatures, in one unit throughout; each conversion adds a note to
-    its record.
+    """The records with each column of `need`, and temperatures, in a single unit; each conversion adds a note to the
+    record.
 
     The target units are the user's (`named`: the option's name and the units of `input` and `output`), else those of a
     parameter file (`file`: its path and units), else those of `model`; if there are none, the first record with a unit
@@ -162,7 +162,7 @@ def in_units(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One source of a record, or several, as a list. Raises TypeError for anything else."""
+    """One record source, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
@@ -193,7 +193,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
 def _check_arrays(record: Record) -> None:
     """Raise ValueError or TypeError unless a record consists of one-dimensional arrays of numbers."""
     if not isinstance(record.name, str):
-        raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
+        raise TypeError(f"a record's name must be text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():
         found = arguments.signal(f"{name} of {record.name}", values)
         if name not in ("v", "y") and len(found) != len(record.t):

@@ -27,7 +27,7 @@ TOGETHER = 1 << 20
 """Samples of a .mat file loaded at a time; short vectors are loaded together up to this number."""
 
 MOST_TOGETHER = 1000
-"""Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested one."""
+"""Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested name."""
 
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
@@ -126,8 +126,7 @@ def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
 
 
 class _MatVectors:
-    """Vectors of a file, which has to be searched from its start to find one; neighbouring vectors are therefore loaded
-    together."""
+    """Vectors of a file; each search begins at the file's start, so neighbouring vectors are loaded together."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -159,7 +158,7 @@ Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[np.gener
 _LABELS, _UNITS = ("label", "name"), ("unit", "units")
 
 HOLDING = ("data", "values")
-"""Names of the fields that hold the numbers of a struct; its label says what they are."""
+"""Names of the fields that hold a struct's numbers; the struct's label says what they are."""
 
 
 def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:

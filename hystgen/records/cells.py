@@ -33,9 +33,9 @@ def is_time(cell: str) -> bool:
 
 
 class Clock:
-    """Reads the times of one column, in file order, as seconds from the first one.
+    """Reads the times of one column, in file order, as seconds from the first time.
 
-    `problem`: why the times cannot be trusted, empty if they can.
+    `problem`: why the times cannot be trusted, empty if there is no reason.
     """
 
     def __init__(self) -> None:
@@ -101,7 +101,7 @@ def _offset(zone: str | None) -> int:
     return (-60 if zone[0] == "-" else 60) * (60 * int(digits[:2]) + int(digits[2:]))
 
 
-# Numbers, and what separates cells ---------------------------------------------------------------------------
+# Numbers and cell separators ---------------------------------------------------------------------------------
 
 
 MISSING = frozenset(
@@ -111,7 +111,7 @@ MISSING = frozenset(
 """Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "
-"""The delimiter of columns separated by any number of blanks, for example to align them."""
+"""The delimiter of columns that are separated by any number of blanks, for example for alignment."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
 """The beginning of a comment line."""
@@ -122,7 +122,7 @@ _THOUSANDS = (
 )
 
 _EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-"""A number whose comma may be a decimal comma or a thousands mark."""
+"""A number with a comma that may be a decimal comma or a thousands mark."""
 
 _MINUTES = re.compile(r"\d+:\d{2}(?:[.,]\d+)?")
 
@@ -159,7 +159,7 @@ class Dialect:
         return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
 
     def weight(self, cell: str) -> int:
-        """1 for a cell with a number or a time of day, 0 for one without a value, -1 for text."""
+        """1 for a cell with a number or a time of day, 0 for a cell without a value, -1 for text."""
         if cell.strip().lower() in MISSING:
             return 0
         try:
@@ -173,7 +173,7 @@ class Dialect:
         return _EITHER.fullmatch(cell.strip()) is not None
 
     def fault(self, cell: str) -> tuple[str, str]:
-        """The fault of a cell that is not a number: its kind (empty if it has none), and what to do about it."""
+        """The fault of a cell that is not a number: its kind (empty if it has none), and advice."""
         text = cell.strip()
         if self.either(text):
             return "comma", "its comma may be a decimal comma or a thousands mark: write decimals with a point"

@@ -1,4 +1,4 @@
-"""Columns of a file: their names, units and sample rates, and which of them we use."""
+"""Columns of a file: names, units, sample rates, and the choice of those to use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import printable
 from hystgen.records.record import Array, Record
 
-# Units: how headers write them, which ones are times, and what several records agree on ----------------------
+# Units: notation in headers, units of time, and units agreed on by several records ---------------------------
 
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
@@ -50,7 +50,7 @@ def split_unit(header: str) -> tuple[str, str]:
     """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
-    # In square brackets anything is a unit except a number, which is that of a channel
+    # In square brackets, anything is a unit except a number, which is a channel number
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
@@ -160,8 +160,8 @@ _LINE = re.compile(
 class Step:
     """The time between two samples in `seconds`, and how the file states it (`said`).
 
-    `of`: the column it belongs to, or the group or struct including its separator; empty for the whole file; `start`:
-    time of the first sample, if the file gives one per column.
+    `of`: the column that the step belongs to, or the group or struct including its separator; empty for the whole file;
+    `start`: time of the first sample, if the file gives a start time per column.
     """
 
     seconds: float
@@ -183,7 +183,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # A word that has its own value is not a unit but the next entry of the line
+            # A word with a value of its own is not a unit but the next entry in the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -227,11 +227,11 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
     return Step(seconds, f"{said} ({printable(where)}{'' if text else ', without a unit'})")
 
 
-# Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
+# Assignment of a file's columns to ours: t, v, y, u ----------------------------------------------------------
 
 
 LISTED = 20
-"""Columns or bad cells that are listed individually; the rest are only counted."""
+"""Number of columns or bad cells that are listed individually; the others are only counted."""
 
 STANDARD = ("t", "v", "y")
 
@@ -257,7 +257,7 @@ OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
      "state", "offset", "gain", "scale", "constant", "range")
 )
-"""Words for things other than the quantity itself."""
+"""Words in column names for things other than the quantity itself."""
 
 COUNTING = frozenset(("index", "scan", "sample", "chunk", "no", "nr", "number", "row", "point", "count", "segment"))
 """Words in the names of columns that count rows."""
@@ -271,9 +271,9 @@ _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 class Column:
     """A column of the file; its name need not be unique.
 
-    `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without
-    its unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`:
-    returns its numbers as a one-dimensional array that the caller owns; `also`: another name that the file gives it.
+    `name`: the full name, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without its
+    unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns
+    the numbers as a one-dimensional array that the caller owns; `also`: another name of the column in the file.
     """
 
     name: str
@@ -312,7 +312,7 @@ def meaning(c: Column) -> str:
     timed = is_time_unit(c.unit)
     found = {ours for ours, known in DECIDE.items() if words & known}
     found = found or {ours for ours, known in MEANINGS.items() if words & known}
-    # A column with a unit is a time if and only if that is a unit of time
+    # A column with a unit is a time if and only if the unit is a unit of time
     if c.unit and timed != ("t" in found):
         return ""
     return found.pop() if len(found) == 1 else ""
@@ -320,7 +320,7 @@ def meaning(c: Column) -> str:
 
 def _words(c: Column) -> set[str]:
     """Words of a column's name, in lower case."""
-    # In "Control Voltage of OutputChan1", only the words before "of" say what the quantity is
+    # In "Control Voltage of OutputChan1", only the words before "of" name the quantity
     quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
     words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
     # A capital T is a temperature more often than a time
@@ -329,7 +329,7 @@ def _words(c: Column) -> set[str]:
 
 def parse_columns(text: str) -> dict[str, str]:
     """Mapping of our names to a file's: `t=Time,v=U,y=Pos`, or columns by number, starting at 1: `1,2,3` for t, v, y
-    and `1,2` for v, y, which become `#1` and so on. Raises ValueError saying what is wrong with it."""
+    and `1,2` for v, y, which become `#1` and so on. Raises ValueError with the problem."""
     numbers = [part.strip() for part in text.split(",")]
     if all(part.isdecimal() for part in numbers):
         if len(numbers) not in (2, 3):
@@ -357,7 +357,7 @@ def parse_columns(text: str) -> dict[str, str]:
 
 @dataclass
 class Finder:
-    """Finds the requested columns; `problems` lists what is wrong with those not found.
+    """Finds the requested columns; `problems` lists the reasons why the others were not found.
 
     `understood`: columns found by the meaning of their names, keyed by our names; `steps`: the file's sample rate for
     the columns found, if it has no time.
@@ -410,7 +410,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """Report columns that are used for two needed ones."""
+        """Report columns that are used for two needed columns."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue
@@ -462,14 +462,13 @@ class Finder:
         return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
-        """How to refer to a column in `--columns`: its name, or its number if the name is not unique or contains a
-        comma."""
+        """How to refer to a column in `--columns`: its name, or its number if the name is ambiguous or has a comma."""
         alone = sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
     def _one(self, ours: str, required: bool) -> Column | None:
         theirs = self.mapping.get(ours, ours)
-        # A path in an HDF5 file may be given from its root, as other tools print it
+        # A path in an HDF5 file may start at the root, as other tools print it
         exact = [c for c in self.columns if c.name in (theirs, theirs.removeprefix("/"))]
         if not exact and theirs[:1] == "#" and theirs[1:].isdecimal():
             place = int(theirs[1:])
@@ -538,7 +537,7 @@ class Finder:
 
 
 def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, Column]:
-    """The other columns, each under its shortest unique name; those without one are omitted."""
+    """The other columns, each under its shortest unique name; columns without such a name are omitted."""
     names: dict[str, Column] = {}
     times = [Counter(getattr(c, part) for c in others) for part in ("label", "own", "name")]
     for c in others:

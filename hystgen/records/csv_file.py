@@ -1,4 +1,4 @@
-"""Text tables, read in blocks: numpy's C reader takes the sound blocks; the others are read line by line.
+"""Text tables, read in blocks: sound blocks by numpy's C reader, the others line by line.
 
 A file of any size thus needs little more memory than its columns, and every fault is reported with its position.
 """
@@ -116,13 +116,13 @@ SAMPLE = 1 << 16
 """Characters read from the start of a file, in whole lines, to determine its layout."""
 
 SAMPLE_LINES = 8
-"""Minimum number of lines in that sample, however long they are: a header, units and a few rows."""
+"""Minimum number of lines used to determine the layout, however long they are: a header, units and a few rows."""
 
 PARAMETERS = re.compile(r"^hystgen\s*:", re.MULTILINE)
 """How a line of a parameter file begins; no line of a table begins like this."""
 
 SPARE = 1.05
-"""Ratio of the rows allocated to the number that the first block suggests."""
+"""Ratio of the number of rows allocated to the number estimated from the first block."""
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
@@ -233,14 +233,14 @@ class _Body:
         self.dialect = layout.dialect
         self.wanted = frozenset(wanted.values())
         self.size = size
-        # Only the column t may hold times of day; in other columns they are text
+        # Only the column t can hold times of day; in other columns they are text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
         self.clock = Clock()
         self.time_column = wanted.get("t")
         # A segment header that continues in the next block; first row, line and start in seconds of each segment
         self.kept = ""
         self.segments: list[tuple[int, int, float]] = []
-        # The columns that may be numeric; text columns and duplicates are not stored
+        # The columns that can be numeric; text columns and duplicates are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
             k: np.empty(0) for k, name in enumerate(self.names) if (name and alike[name] == 1) or k in self.wanted
@@ -324,7 +324,8 @@ class _Body:
         return reading.finished(numbers, taken, self.lines)
 
     def _join_segments(self) -> None:
-        """Put the rows of all segments on a common time axis. Raises RecordError if one begins before another ends."""
+        """Put the rows of all segments on a common time axis. Raises RecordError if a segment begins before another
+        ends."""
         layout = self.layout.segments
         if layout is None:
             return
@@ -347,7 +348,8 @@ class _Body:
                 )
 
     def _room(self, rows: int, size: int) -> None:
-        """Make room for `rows` more rows; the first time, for all rows of the file if these take `size` bytes."""
+        """Make room for `rows` more rows; on the first call, for the whole file, given that these rows take `size`
+        bytes."""
         needed = self.rows + rows
         have = min((len(x) for x in self.stored.values()), default=needed)
         if needed <= have:
@@ -355,7 +357,7 @@ class _Body:
         expected = int(SPARE * rows * self.size / max(size, 1)) if not self.rows else needed + needed // 4
         for k in self.stored:
             if not self.rows:
-                # Not by resize, which fills memory with zeros that may never be needed
+                # resize would fill memory with zeros that may never be needed
                 self.stored[k] = np.empty(max(needed, expected))
             else:
                 self.stored[k].resize(max(needed, expected), refcheck=False)
@@ -388,7 +390,7 @@ class _Body:
         return cells
 
     def _regular(self, text: str, lines: int) -> bool:
-        """Whether every line has as many cells as the header; numpy checks only the columns that are requested."""
+        """Whether every line has as many cells as the header; numpy checks only the requested columns."""
         try:
             data = np.frombuffer(text.encode("latin-1"), dtype=np.uint8)
         except UnicodeEncodeError:
@@ -417,7 +419,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Read line by line: reports wrong cells with their positions, and accepts missing ones."""
+        """Read line by line: reports wrong cells with their positions, and accepts missing cells."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []

@@ -1,7 +1,7 @@
 """HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
 
 A record is one file: datasets behind external links, with external storage, or assembled from others (virtual) are not
-read, since that would open any file that this one names.
+read, since that would open any file named in this file.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LONGEST = 1 << 10
 
 DEEPEST = 32
 """[levels] Nesting limit of groups, like that of structs in `mat_nesting`: 20,000 levels take minutes, since the path
-of each group contains all those above it."""
+of each group contains the names of all groups above it."""
 
 _MATLAB_OWN = ("#refs#", "#subsystem#")
 """Groups in which MATLAB keeps the contents of its cell arrays and objects."""

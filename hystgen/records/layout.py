@@ -1,8 +1,8 @@
 """The layout of a text table: its separator, header lines, units and number format.
 
-The layout is inferred from the numbers: the separator and decimal mark are the ones that turn the most cells of the
-first lines into numbers. Header and units are then the lines above with the same number of cells. Files of some
-instruments state their layout in a header.
+The layout is inferred from the numbers: the separator and decimal mark are those that turn the most cells of the first
+lines into numbers. Header and units are then the lines above with the same number of cells. Files of some instruments
+state their layout in a header.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
 """How to name columns by number in a table with this many columns."""
 
 EXAMPLE = "1,2,3"
-"""How to name them in any wider table."""
+"""How to name columns by number in any wider table."""
 
 
 @dataclass
@@ -39,7 +39,7 @@ class TableLayout:
 
     `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
     rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
-    `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text that would begin
+    `clocks`: columns of times of day; `rows`: number of rows stated in the file; `another`: text that would begin
     another table; `segments`: further headers among the rows, after which the table continues.
     """
 
@@ -145,7 +145,8 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
 
 
 def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout | None:
-    """The layout with the plain header, or with one in a comment above the numbers if it names more of our columns."""
+    """The layout with the plain header, or with a commented header above the numbers if it names more of our
+    columns."""
     plain, comment = _plain_header(view, lines), _comment_header(view, lines)
     if plain is None or comment is None:
         return plain or comment
@@ -329,7 +330,7 @@ def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
     return numbers and cells[0] in text and not _are_units(cells)
 
 
-# Headers of instruments; each function returns None for any other file ---------------------------------------
+# Instrument headers; each function returns None for any other file -------------------------------------------
 
 
 # LabVIEW measurement files (`.lvm`) --------------------------------------------------------------------------
@@ -420,8 +421,8 @@ class Segments:
     """Segments after the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
 
     By NI's specification, times are seconds since the date and time of the segment if `Time_Pref` is `Relative`, and
-    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: those
-    of the first segment.
+    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: names
+    and tags of the first segment.
     """
 
     reading: Reading

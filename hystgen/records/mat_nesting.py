@@ -1,7 +1,7 @@
-"""How deep structs and cells are nested in a MATLAB v5 file, from its headers alone.
+"""Nesting depth of structs and cells in a MATLAB v5 file, from its headers alone.
 
-scipy reads them by recursion in C, so a file of a few hundred kilobytes can crash the process. The elements are
-therefore walked here first, in the order in which scipy reads them, with an explicit stack.
+scipy reads structs and cells by recursion in C, so a file of a few hundred kilobytes can crash the process. The
+elements are therefore walked here first, in the order in which scipy reads them, with an explicit stack.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ PIECE = 1 << 16
 
 
 def problem(stream: IO[bytes]) -> str:
-    """Why a file must not be passed to scipy, in words; empty if it may.
+    """The reason why a file must not be passed to scipy; empty if it is safe.
 
     An element that is truncated or not an array stops the walk; scipy stops there as well, with a message.
     """
@@ -147,7 +147,7 @@ class _Elements:
                 open_.pop()
 
     def _inside(self, top: bool) -> int:
-        """How many arrays an array contains; everything else in it is skipped."""
+        """Number of arrays inside an array; its other content is skipped."""
         self._bytes(8)
         (flags, _) = struct.unpack(f"{self._order}II", self._bytes(8))
         sort = flags & 0xFF

@@ -38,14 +38,14 @@ Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.generic] | tuple[ArrayLik
 of drive and displacement, preceded by the time if there are three."""
 
 _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
-"""Options named in messages about files; for data in memory, arguments of the call replace them."""
+"""Options named in messages about files, which become arguments of the call in messages about data in memory."""
 
 
 def in_memory(source: object) -> TypeGuard[Columns]:
     """Whether something holds the samples of one record, judged by its type alone."""
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
-    # A list may be one of paths or records, so only tuples hold arrays
+    # A list may contain paths or records, so only tuples hold arrays
     return isinstance(source, tuple) and bool(source) and all(_is_samples(each) for each in source)
 
 

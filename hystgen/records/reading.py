@@ -1,4 +1,4 @@
-"""What all formats share: the request, the problems found, the columns chosen, and the record made from them."""
+"""Code shared by all formats: the request, the problems found, the columns chosen, and the record made from them."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ SAME_STEP = 1e-6
 """Largest relative difference between sample times that count as equal: files write seven digits or a round number."""
 
 BESIDE = 2
-"""[times] Memory needed to read a record relative to that of its numbers, because of sorted copies and masks: 1.7 with
-2e7 samples of HDF5 (2026-11-26)."""
+"""[times] Memory needed to read a record relative to the memory of its numbers, because of sorted copies and masks: 1.7
+with 2e7 samples of HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
 """Times this large are not seconds: seconds since 1970 reach this number in the year 5138, milliseconds did in 1973."""
@@ -82,7 +82,7 @@ class Table:
 class Reading:
     """A file being read: the request, and the problems and notes so far.
 
-    `delimiter`: what separates cells, None to infer it from the file; `fills`: for each column with numbers that stand
+    `delimiter`: the cell separator, None to infer it from the file; `fills`: for each column with numbers that stand
     for "no value", a phrase naming them; `points`: whether the file may lack a time; `read_as`: interpretations that
     the file does not state plainly.
     """
@@ -104,7 +104,7 @@ class Reading:
             self.delimiter = "\t"
 
     def understood(self, text: str) -> None:
-        """Add to the line that says how the file was interpreted."""
+        """Add to the line that reports how the file was interpreted."""
         self.read_as.append(text)
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
@@ -142,7 +142,7 @@ class Reading:
         line: int | None = None,
         steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The requested columns, keyed by our names. Raises RecordError for those that are missing.
+        """The requested columns, keyed by our names. Raises RecordError for missing columns.
 
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
@@ -196,9 +196,9 @@ class Reading:
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
-        It reads the requested columns and, from the groups that hold them, all others of the same length, except those
-        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: shapes
-        and readers by name; in a file without vectors, a single matrix is the record.
+        The table has the requested columns and, from the groups that hold them, all others of the same length, except
+        those that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`:
+        shapes and readers by name; in a file without vectors, a single matrix is the record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
@@ -298,7 +298,7 @@ SHORTEST = 16
 """Minimum number of samples in a record that a model can be fitted to."""
 
 REPAIRABLE = 0.05
-"""Largest share of samples that may be dropped with a note; if there are more, the file is refused."""
+"""Largest fraction of samples that may be dropped with a note; if more are faulty, the file is refused."""
 
 NOTED_GAP = 3.0
 """A step longer than this many median steps is a gap."""
@@ -324,7 +324,7 @@ def repaired(reading: Reading, table: Table) -> Record:
         keep = _rising(reading, table, columns["t"], keep)
     samples = int(np.count_nonzero(keep))
     if samples < length:
-        # One at a time, so that only one column exists twice
+        # One column at a time, so that only one of them exists twice
         for name in columns:
             columns[name] = columns[name][keep]
     fit = "y" in reading.need
@@ -371,8 +371,7 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
 
 
 def _repeats(t: Array) -> bool:
-    """Whether a time that never decreases repeats too often to be repaired, because it was written with too few
-    digits."""
+    """Whether a non-decreasing time repeats too often to be repaired because it was written with too few digits."""
     steps = np.diff(t)
     if not len(steps) or float(steps.min()) != 0.0 or float(steps.max()) == 0.0:
         return False
@@ -380,7 +379,7 @@ def _repeats(t: Array) -> bool:
 
 
 def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> Array:
-    """Replace repeated times by times at the given sample time, unless the repeated ones contradict it."""
+    """Replace repeated times by times at the given sample time, unless the repeated times contradict it."""
     rows = np.flatnonzero(keep)
     steps = np.diff(t[rows])
     finest = float(np.min(steps[steps > 0.0]))
@@ -442,7 +441,7 @@ def _step(reading: Reading, t: Array) -> float:
     return step
 
 
-# Numbers that stand for "no value": what instruments write instead of a reading, and impossible readings -------
+# Numbers that stand for "no value": placeholders that instruments write, and impossible readings ---------------
 
 
 LARGEST = 1e20

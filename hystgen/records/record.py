@@ -17,10 +17,9 @@ class Record:
 
     `name`: file name without its folder; `t`: seconds, strictly increasing; `v`: drive (empty if the file has no such
     column and none was needed); `y`: measured displacement or None; `extra`: further numeric columns by name;
-    `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the file's
-    units by column (`{"t": "s", "v": "V"}`), in which `v` and `y` are kept; `read_as`: how the file was interpreted,
-    empty for plain CSV or arrays under our names; `timed`: whether `t` is a time rather than a count of points taken
-    one by one.
+    `sample_time`: median step of `t`; `notes`: repairs and omissions, one sentence each; `units`: the file's units by
+    column (`{"t": "s", "v": "V"}`), in which `v` and `y` are kept; `read_as`: how the file was interpreted, empty for
+    plain CSV or arrays under our names; `timed`: whether `t` is a time rather than a count of points taken one by one.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Units of columns: which ones measure the same quantity, and how to convert records to the units of a model.
+"""Column units: comparison of quantities, and conversion of records to the units of a model.
 
 Lengths, voltages and so on are converted by their SI prefixes, temperatures by scale and zero. The meaning of an
 unknown unit is never guessed; it is only compared as text.
@@ -68,7 +68,7 @@ TEMPERATURES = {
 
 
 class Quantity(NamedTuple):
-    """What a unit measures: `kind`, named by its base unit; the `size` and `zero` of the unit in that base unit."""
+    """A unit's quantity: `kind`, named by its base unit, with `size` and `zero` of the unit in that base unit."""
 
     kind: str
     size: Fraction
@@ -104,8 +104,7 @@ class Conversion(NamedTuple):
     plus: Fraction = Fraction(0)
 
     def __call__(self, x: Array) -> Array:
-        """The numbers (N,) in the other unit; if the factor is a power of ten, each is the double nearest to the exact
-        value."""
+        """The numbers (N,) in the other unit; with a power of ten, each is the double nearest to the exact value."""
         top, bottom = self.times.numerator, self.times.denominator
         found: Array = x / bottom if top == 1 else x * float(top if bottom == 1 else self.times)
         return found + float(self.plus) if self.plus else found
@@ -130,8 +129,8 @@ def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
 class UnitGoal(NamedTuple):
     """The target unit for the drive or the displacement of records.
 
-    `unit`: empty if the first record with a unit decides; `whose`: what messages call the quantity; `named`: given by
-    the user, who thereby declares what an unknown unit is; `told`: whether to report that a record has decided.
+    `unit`: empty if the first record with a unit decides; `whose`: the quantity's name in messages; `named`: given by
+    the user, who thereby declares the meaning of an unknown unit; `told`: whether to report that a record has decided.
     """
 
     unit: str = ""
@@ -219,7 +218,7 @@ def _named(column: str, unit: str) -> str:
 
 
 def _apart(column: str, own: str, goal: UnitGoal, option: str) -> str:
-    """The message saying that a column cannot be converted to the target unit, and what to do about it."""
+    """The message saying that a column cannot be converted to the target unit, and advice."""
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]
     if not strange:

@@ -25,13 +25,13 @@ def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
 
 
 def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: Sequence[ArrayLike]) -> None:
-    """Write `columns_text` to a file, all or nothing."""
+    """Write `columns_text` to a file, completely or not at all."""
     write_atomically(path, columns_text(header, arrays))
 
 
 def _texts(values: NDArray[np.generic]) -> list[str]:
     if values.ndim != 1:
-        raise ValueError("a column has one dimension")
+        raise ValueError("a column must have one dimension")
     if values.dtype == np.float64 or values.dtype.kind in "iub":
         return [repr(x) for x in values.tolist()]
     return [str(x) for x in values]

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page on the missing effects, their share of the error, and the remaining error."""
+"""The report of a diagnosis: one page on the missing effects, the error due to each, and the remaining error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and by what method."""
+"""Accuracy and method of a compensator's correction for a stage in front of the plays."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
@@ -83,7 +83,7 @@ def _next_step(found: Diagnosis) -> Text:
         plan = "hystgen diagnose --plan params.yaml -o plan/"
         return Text("Your next step: record drives in which every effect shows.", plan)
     if found.not_emitted():
-        return Text("Your next step: see how much error the model would leave.", "hystgen track params.yaml RECORDS")
+        return Text("Your next step: see the tracking error with the model.", "hystgen track params.yaml RECORDS")
     return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
 
 
@@ -117,7 +117,7 @@ NOISE_FROM = {
     "differences": "the differences between neighbouring samples, since the records have no holds and no equal periods",
     "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
 }
-"""The source of the noise floor, in words."""
+"""The source of the noise floor, as text."""
 
 
 def _noise(result: Result) -> Text:
@@ -149,7 +149,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text("What they mean for a compensator:"),
         HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
-        else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
+        else Text("Error of the motion with the compensator:", "hystgen track params.yaml RECORDS"),
         Text(
             "Their parameters. The intervals account for correlated residuals and for free weights, but not for other "
             "shapes that may fit as well:"
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: object, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high end, one per number; equal lists are represented by the first."""
+    """Rows of name, value, lower and upper end, one per number; equal lists are represented by the first."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
@@ -197,7 +197,7 @@ def _left(result: Result) -> list[Text | Listing | HtmlTable]:
         if is_noise(after, noise):
             return [Text("Only noise.")]
         times = f"The remaining error is {times_noise(after / noise)}"
-        return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
+        return [Text(f"{times}, but it has no distinct features: noise that is not white looks the same.")]
     sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | HtmlTable] = [Listing(sentences)]
     for each in seen:
@@ -280,4 +280,4 @@ def _ranking(result: Result) -> list[Text | HtmlTable]:
             rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
         blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), HtmlTable(rows, (0, 1, 5))]
-    return blocks or [Text("None: the refitted model leaves only noise.")]
+    return blocks or [Text("None: with the refitted model, only noise remains.")]

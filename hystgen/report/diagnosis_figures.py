@@ -1,4 +1,4 @@
-"""The figures of a diagnosis: how the gap shrinks, where it is, and what it depends on, each showing the noise."""
+"""The figures of a diagnosis: the gap after each step, its location, and what it depends on, each with the noise."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def steps(found: Diagnosis) -> list[tuple[str, float]]:
 
 
 def gap(found: Diagnosis, width: float) -> Figure:
-    """How much each step removes from the held-out error, down to the noise."""
+    """The reduction of the held-out error by each step, down to the noise."""
     stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
     values = [*(value for _, value in stages), noise]
@@ -132,7 +132,7 @@ def overlay(found: Diagnosis, width: float) -> Figure:
 
 
 def records(found: Diagnosis, width: float) -> Figure:
-    """rms of every record before and after."""
+    """rms error of every record before and after."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     drawn = drawing.figure(width, 1.3 + 0.34 * len(shown))
     axes = drawn.subplots()
@@ -142,7 +142,7 @@ def records(found: Diagnosis, width: float) -> Figure:
         axes.plot(values[key], places, "o", color=colour, markersize=6, label=what)
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
-    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last
+    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last record
     _range(axes, [*values["before"], *values["after"], found.result.noise_floor], "x")
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
@@ -150,7 +150,7 @@ def records(found: Diagnosis, width: float) -> Figure:
 
 
 def against(found: Diagnosis, width: float) -> Figure:
-    """Mean and scatter of the error of all records over the variables that it may depend on."""
+    """Mean and scatter of the error of all records against the variables that it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     units, unit = found.parameters.units, found.result.unit
     wide = width == WIDE
@@ -218,7 +218,7 @@ def _direction(each: Signals) -> Array:
 
 
 def time(found: Diagnosis, width: float) -> Figure:
-    """rms of the error in stretches of the records along the session."""
+    """rms error in stretches of the records over the session."""
     shown = sorted((s for s in found.signals if np.isfinite(s.before).any()), key=lambda each: float(each.t[0]))
     one_clock = all(a.t[-1] <= b.t[0] for a, b in itertools.pairwise(shown))
     drawn = drawing.figure(width, 3.4)
@@ -316,10 +316,10 @@ FIGURES = {
 
 CAPTIONS = {
     "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after another; "
-    "dotted: what each step removes. The dashed line is the noise, measured without a model.",
+    "dotted: the part that each step removes. The dashed line is the noise, measured without a model.",
     "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted.",
     "records": "rms error of every record, against the noise.",
-    "time": "rms error in stretches of the records, along the session.",
+    "time": "rms error in stretches of the records over the session.",
     "against": "Mean and scatter of the error on all records against possible causes. A mean that leaves the "
     "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
     "reversals of the drive. While the drive rests, the error is counted in the direction of its last move.",
@@ -330,7 +330,7 @@ ALTERNATIVES = {
     "gap": "The held-out error after each step, down to the noise.",
     "overlay": "Measured and predicted displacement over time, and below it the error before and after.",
     "records": "Points for the rms error of every record before and after, with the noise as a line.",
-    "time": "rms error before and after along the session, with the noise as a line.",
+    "time": "rms error before and after over the session, with the noise as a line.",
     "against": "Six panels of binned errors before and after against drive, rate, displacement, loop centre, session "
     "time and time since the drive stopped, with the noise.",
     "frequency": "Spectral density of the error before and after, with that of white noise.",

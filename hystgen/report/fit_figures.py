@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS, FEWEST = 40, 5
-"""Number of bins of the residual's mean, and the fewest samples in a bin that is drawn."""
+"""Number of bins for the residual's mean, and minimum number of samples in a bin that is drawn."""
 
 TAIL, FAR = 0.002, 3.0
-"""[quantiles, times] An axis ends at these quantiles if the extremes lie this many times farther out."""
+"""[quantiles, times] An axis ends at these quantiles if the extremes are this many times farther out."""
 
 AGREE = 1.2
 """Two estimates of the noise that differ by at most this factor agree."""
@@ -91,7 +91,7 @@ class Shown:
 
         Second differences remove the smooth part of a residual and leave the noise times the square root of 6 (Gasser,
         Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). The estimates from adjacent samples and from every
-        other sample agree only if the noise is white and all else is smooth.
+        other sample agree only if the noise is white and the rest is smooth.
         """
         found = []
         for lag in (1, 2):
@@ -112,7 +112,7 @@ def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
 
 
 def drawn_ones(shown: Sequence[Shown]) -> list[Shown]:
-    """The record with the largest error among the fitted ones and among the held-out ones."""
+    """The fitted record and the held-out record with the largest error."""
     groups = [[each for each in shown if each.used.held_out == held] for held in (False, True)]
     return [max(group, key=lambda each: each.rms) for group in groups if group]
 
@@ -193,7 +193,7 @@ def overlay_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
     t = each.time
     if len(each.used.outliers):
         assert each.record.y is not None
-        # those beyond the axis are drawn at its edge
+        # outliers beyond the axis are drawn at its edge
         places = np.clip(each.record.y[each.used.outliers], low - 0.7 * margin, high + 0.7 * margin)
         axes.plot(t[each.used.outliers], places, "x", color=drawing.FAULT, markersize=5, label="outlier")
     if len(each.used.bridged):
@@ -237,7 +237,7 @@ def _against_panel(axes: Axes, x: Array, residual: Array, noise: float | None) -
 
 
 def binned(x: Array, values: Array, low: float, high: float) -> tuple[Array, Array, Array]:
-    """Middle (BINS,), mean and standard deviation of the values in even bins of x; NaN in bins with too few."""
+    """Middle (BINS,), mean and standard deviation of the values in even bins of x; NaN in bins with too few values."""
     edges = np.linspace(low, high, BINS + 1)
     inside = (x >= low) & (x <= high)
     place = np.clip(np.searchsorted(edges, x[inside], side="right") - 1, 0, BINS - 1)
@@ -340,7 +340,7 @@ def judged(shown: Sequence[Shown]) -> list[Shown]:
 
 
 def noise_of(shown: Sequence[Shown]) -> float | None:
-    """The largest noise of the records; None if it is unknown for any of them."""
+    """The largest noise of the records; None if it is unknown for any record."""
     found = [each.noise for each in shown]
     known = [sigma for sigma in found if sigma is not None]
     return max(known) if known and len(known) == len(found) else None
@@ -393,7 +393,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
 
 
 def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
-    """The weights over their thresholds, p_0 on an axis of its own."""
+    """The weights against their thresholds, with p_0 on an axis of its own."""
     units = units_of(fit)
     n = len(fit.parameters.model.pi.thresholds) - 1
     figure = drawing.figure(9.6 if wide else 4.4, 3.6)

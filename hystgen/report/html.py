@@ -42,7 +42,7 @@ class HtmlTable:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as SVG, in one layout for wide pages and one for phones; `alt` describes it in words."""
+    """A picture as SVG, in one layout for wide pages and one for phones; `alt` is its text description."""
 
     name: str
     wide: bytes

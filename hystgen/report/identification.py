@@ -77,7 +77,7 @@ def report_fit(
     other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
-        raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
+        raise TypeError(f"fit must be a result of hystgen.identify, not {arguments.kind(fit)}")
     sources = [*several(records), *several(holdout)]
     return write(fit, in_units(read_records(sources), fit.parameters.units, sources=sources), folder)
 
@@ -85,9 +85,10 @@ def report_fit(
 def write(
     fit: Fit, records: Sequence[Record], folder: str | os.PathLike[str], parameter_file: str | None = None
 ) -> Path:
-    """Write report.html and every picture as SVG and PNG into a folder, all or nothing. Returns the page's path.
+    """Write report.html and every picture as SVG and PNG into a folder, either all files or none. Returns the page's
+    path.
 
-    `records`: those of the fit, then the held-out ones. `parameter_file`: its name in the command for the next step.
+    `records`: the fitted records, then the held-out ones. `parameter_file`: name used in the command for the next step.
     Raises PlotError without matplotlib, ValueError for records other than those of the fit, OSError.
     """
     check_folder(folder)
@@ -115,7 +116,7 @@ def write(
 
 
 def _kind(fit: Fit) -> str:
-    """The kind of model in words."""
+    """A phrase for the kind of model."""
     plays = fit.parameters.model.pi.thresholds
     cascade = cascade_of(fit.parameters)
     count = counted(len(plays) - 1, "play")
@@ -200,8 +201,8 @@ def _table(fit: Fit) -> list[Text | HtmlTable | Listing]:
         chosen = next(each for each in candidates if each.rms == row.rms)
         blocks.append(
             Text(
-                f"{chosen.model} was chosen: of the candidates, the simplest first, it is the first whose held-out "
-                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the least, {best:.4g}"
+                f"{chosen.model} was chosen: it is the simplest candidate whose held-out "
+                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the smallest, {best:.4g}"
                 f"{f' {fit.unit}' if fit.unit else ''}."
             )
         )
@@ -408,7 +409,7 @@ def _loading_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
 
 def _weights_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
     return (
-        "Weights over their thresholds; the lines are 95 % intervals. p_0 is the part without hysteresis, on a scale "
+        "Weights against their thresholds; lines: 95 % intervals. p_0 is the part without hysteresis, on a scale "
         "of its own. Neighbouring plays can replace each other: a wide interval of one weight does not make the "
         "loading curve uncertain."
         + (" Thresholds are in the output of the front." if fit.parameters.model.memoryless else "")

@@ -36,7 +36,8 @@ class Plan(planning.PlannedDrives):
     """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; returns the paths.
+        """Write the CSV files and `plan.html`, which explains them, into a folder, either all files or none; returns
+        the paths.
 
         Raises PlotError without matplotlib, OSError.
         """
@@ -111,7 +112,7 @@ def _steps(plan: Plan, home: str) -> list[str]:
 
 
 def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
-    """What to do with a session at one rate."""
+    """Instructions for a session at one rate."""
     session, samples = plan.session, plan.session.samples if plan.session else 0
     assert session is not None
     said = [

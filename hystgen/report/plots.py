@@ -51,7 +51,7 @@ def show_fit(fit: Fit, records: Sequence[Record], path: str | os.PathLike[str]) 
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
     """Measured and predicted loop of one record, residuals over time, and the weights.
 
-    `records`: those of the fit, then the held-out ones; the loop is that of a held-out record if there is one.
+    `records`: the fitted records, then the held-out ones; the loop is from a held-out record if there is one.
     """
     units = fit_figures.units_of(fit)
     shown = fit_figures.of_fit(fit, records)

@@ -1,4 +1,4 @@
-"""The properties of a model in words."""
+"""The properties of a model as text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HARD_RATIO = 1e6
 """Slope ratio above which a warning is given: a float32 rounding error, 6e-8, becomes 6 % of the drive."""
 
 WIDE = 0.05
-"""Share of the drive range above which an error of the inverse is mentioned."""
+"""Fraction of the drive range above which an error of the inverse is mentioned."""
 
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
@@ -26,7 +26,7 @@ UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 def properties(model: Model, within: float = SETTLED) -> str:
     """The text of `hystgen show`: ranges, slopes, loop width, settling, whether there is an inverse, error bounds.
 
-    `within`: error within which the output counts as settled, share of a step.
+    `within`: error within which the output counts as settled, as a fraction of a step.
     """
     c, p = model.cascade, model.parameters
     pi = c.pi
@@ -113,7 +113,7 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 
 def cost(model: Model) -> str:
-    """Cost of the C that `emit` would write, for the forward operator if there is no inverse; "" if `emit` refuses."""
+    """Cost of the C that `emit` would write, forward only if there is no inverse; empty if `emit` refuses."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
         found = module.of(model.parameters, model.cascade, options).cost

@@ -1,4 +1,4 @@
-"""Disturbances in the errors of a model: spectral lines, a ripple over the position, stick-slip.
+"""Disturbances in a model's errors: spectral lines, position-dependent ripple and stick-slip.
 
 Lines and ripples that dominate the errors are removed from the records: hum hides effects, and a ripple would be
 mistaken for effects or stick-slip. Stick-slip is reported with its location and count, but never named as an effect.
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 MAINS = (50.0, 60.0)
-"""Hz: the world's mains frequencies."""
+"""[Hz] Mains frequencies used worldwide."""
 
 MAINS_HARMONICS = (1, 2, 3, 5)
 """Harmonics found in power supplies: 2 comes from rectifiers, 3 and 5 from transformer cores."""
@@ -34,7 +34,7 @@ MAINS_HARMONICS = (1, 2, 3, 5)
 
 @dataclass(frozen=True)
 class Removed:
-    """A line or ripple, the errors without it, and its share of the variance of all errors."""
+    """A line or ripple, the errors without it, and its fraction of the variance of all errors."""
 
     finding: Line | Ripple
     errors: list[Array]
@@ -42,7 +42,7 @@ class Removed:
 
 
 def removed_share(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """Share of the power of the errors `before` that is absent from the errors `after`."""
+    """Fraction by which the power of the errors falls from `before` to `after`."""
     total = _power(before)
     return 1.0 - _power(after) / total if total > 0.0 else 0.0
 
@@ -52,7 +52,7 @@ def _power(errors: Sequence[Array]) -> float:
 
 
 def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line that enough sufficiently long records show, or that dominates the errors of a few."""
+    """The strongest line that enough of the long records show, or that dominates the errors of a few records."""
     found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         found += [(share, frequency, k) for share, frequency in peaks(item, error)]
@@ -71,7 +71,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
         common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
         rules = min(p[0] for p in near) > acceptance.RULING_SHARE
         if (common or rules) and (best is None or strength > best[0]):
-            longest = max(near, key=lambda p: lengths[p[2]])  # it gives the most accurate frequency
+            longest = max(near, key=lambda p: lengths[p[2]])  # the longest record gives the most accurate frequency
             best = strength, longest[1], seen, able
     if best is None:
         return None
@@ -79,7 +79,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     frequency = _refined(items, errors, frequency, seen, lengths)
     after, sizes, has = [], [], []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
-        if lengths[k] * frequency < 2.0:  # fewer than two periods do not make a line
+        if lengths[k] * frequency < 2.0:  # a line needs at least two periods
             after.append(error)
             continue
         e, size = _without(error, _phase(item, frequency))
@@ -101,7 +101,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
 
 def _mains(frequency: float, width: float) -> float | str | None:
-    """The mains frequency that a line matches, or the harmonic in words; `width`: the line's uncertainty, Hz."""
+    """The mains frequency that a line matches, or the harmonic as text; `width`: the line's uncertainty, Hz."""
     for mains in MAINS:
         for n in MAINS_HARMONICS:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
@@ -110,10 +110,9 @@ def _mains(frequency: float, width: float) -> float | str | None:
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line, if in most records that show it, each half predicts the line in the other half.
+    """The strongest line, if in most records that show it each half predicts the line in the other half.
 
-    The actuator makes no steady lines of its own: it responds at the lines of its drive, which are excluded, and its
-    ringing decays.
+    The actuator produces no steady lines of its own: lines of the drive are excluded, and ringing decays.
     """
     line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
@@ -158,7 +157,7 @@ def _phase(item: Item, frequency: float) -> Array:
 
 
 def _without(error: Array, phase: Array) -> tuple[Array, float]:
-    """The error minus its best-fitting sinusoid over a phase, and the amplitude of that sinusoid."""
+    """The error minus the best-fitting sinusoid of this phase, and the sinusoid's amplitude."""
     known = np.isfinite(error)
     table = np.column_stack([np.cos(phase[known]), np.sin(phase[known]), np.ones(int(np.count_nonzero(known)))])
     solution = np.linalg.lstsq(table, error[known], rcond=None)[0]
@@ -171,19 +170,19 @@ def _without(error: Array, phase: Array) -> tuple[Array, float]:
 
 
 MOST_SAMPLES = 20_000
-"""Approximate number of samples used to refine a pitch: with these, only noise limits the accuracy."""
+"""Approximate number of samples used to refine a pitch; with this many, only noise limits the accuracy."""
 
 FINER = 4
-"""Zero-padding factor of the spectrum over position: pitches between integer fractions of the range get bins."""
+"""Zero-padding factor for the spectrum over position: pitches between integer fractions of the range get bins too."""
 
 
 @dataclass(frozen=True)
 class _Motion:
     """The motion of a record at the compared samples, selected by `at`.
 
-    `places`: predicted positions; `errors`: the errors there; `moves`: change of the prediction since the previous
-    sample, NaN during holds, which measure one position repeatedly and to which the model has been fitted. Places are
-    predicted, not measured: over the measured position, a ripple that is large relative to its pitch is not sinusoidal.
+    `places`: predicted positions; `errors`: the errors at these positions; `moves`: change of the prediction since the
+    previous sample, NaN during holds, which only repeat a position that the model was fitted to. Positions are
+    predicted because a ripple that is large relative to its pitch is not sinusoidal over the measured position.
     """
 
     at: NDArray[np.bool_]
@@ -207,7 +206,7 @@ class _Motion:
 
 
 def in_position(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """A ripple over the predicted position, with the same phase in all records."""
+    """A ripple that follows the predicted position with the same phase in all records."""
     motions = [_Motion.of(item, error) for item, error in zip(items, errors, strict=True)]
     if sum(len(motion.places) for motion in motions) < acceptance.SPECTRUM_SAMPLES:
         return None
@@ -272,9 +271,9 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
 def _ripple(
     items: Sequence[Item], errors: Sequence[Array], motions: Sequence[_Motion], pitch: float
 ) -> Removed | None:
-    """The ripple, if most passes, up or down over several pitches, show the ripple that all other passes predict.
+    """The ripple, if most passes (up or down over several pitches) show the ripple that all others predict.
 
-    The error due to a lag or a loop differs between passes up and passes down.
+    An error due to a lag or a hysteresis loop, by contrast, differs between upward and downward passes.
     """
     tables = [
         np.column_stack([np.cos(2.0 * np.pi * motion.places / pitch), np.sin(2.0 * np.pi * motion.places / pitch)])
@@ -329,7 +328,7 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | R
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
-    """As `lines`, for those that dominate the errors and do not come from the actuator: steady lines and ripples."""
+    """Like `lines`, but only steady lines and ripples that dominate the errors; the actuator does not cause these."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 
@@ -353,20 +352,20 @@ def _strongest_first(
 Fitted = TypeVar("Fitted", bound=FittedLike)
 
 ROUNDS = 3
-"""Maximum number of rounds of removal: a model fitted to a ripple predicts wrong positions for it, and improves once
-the ripple is removed."""
+"""Maximum number of removal rounds: a model fitted with a ripple predicts wrong positions until the ripple is
+removed."""
 
 
 @dataclass(frozen=True)
 class Cleaned:
-    """Records as measured, the same records without their lines, and these lines."""
+    """Records as measured, the same records without their lines, and the lines."""
 
     measured: Prepared
     clean: Prepared
     lines: tuple[Line | Ripple, ...] = ()
 
     def seen_by(self, fitted: FittedLike) -> Cleaned:
-        """The measured records without the lines in a model's errors, with ripples over its predicted positions."""
+        """The measured records without the lines in a model's errors; its predictions locate the ripples."""
         measured, clean = _items(self.measured), _items(self.clean)
         errors = [
             error + (item.y - without.y)
@@ -382,12 +381,12 @@ class Cleaned:
         return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), lines=lines)
 
     def left_by(self, fitted: FittedLike) -> bool:
-        """Whether a model's errors over the clean records still show lines to remove."""
+        """Whether a model's errors on the cleaned records still show lines to remove."""
         clean = _items(self.clean)
         return bool(ruling(clean, fitted.errors(clean))[0])
 
     def notes(self, unit: str | None) -> list[str]:
-        """Repairs of the records, one sentence each."""
+        """Repairs made to the records, one sentence each."""
         return [line.sentence(unit) for line in self.lines]
 
 
@@ -402,7 +401,7 @@ def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted
 
 
 def _moving(ready: Prepared) -> Prepared:
-    """The records without their holds, in which a ripple is an offset that the fit would absorb unnoticed."""
+    """The records without their holds: there a ripple is a constant offset, which the fit would absorb unnoticed."""
 
     def without_holds(item: Item) -> Item:
         y = item.y.copy()
@@ -414,7 +413,7 @@ def _moving(ready: Prepared) -> Prepared:
 
 
 def is_known(line: Line | Ripple, others: Sequence[Line | Ripple]) -> bool:
-    """Whether a line is the remainder of one that is already known."""
+    """Whether a line is the remainder of a known line."""
     return any(
         each.kind == line.kind and abs(line.place / each.place - 1.0) < acceptance.SAME_LINE for each in others
     )
@@ -434,7 +433,7 @@ def stick_slip(items: Sequence[Item], errors: Sequence[Array], noise: float) -> 
 
 
 def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
-    """Judge, over stretches of predicted motion well above the noise, how often the output stands still or leaps.
+    """Judge how often the output stands still or leaps where the predicted motion is well above the noise.
 
     The error due to a lag or ringing is smooth: it continues from one stretch to the next, whereas a leap makes up for
     the standstill before it. Also, the output hardly moves before and after a jump, whatever the model predicts.
@@ -470,7 +469,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether moves at some samples far exceed those nearby, except adjacent ones: a filter may spread a jump."""
+    """Whether some moves far exceed nearby ones, not counting adjacent ones, over which a filter can spread a jump."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -1,6 +1,6 @@
-"""Records as a diagnosis compares them: a record with its compared samples, and the same with fewer of them.
+"""Records prepared for comparison with a model, with all usable samples or with fewer.
 
-Inside a stretch over which drive and plays are linear, no samples are needed: plays depend only on turning points, and
+Inside a stretch where drive and plays are linear, no samples are needed: plays depend only on turning points, and
 filters are exact for linear inputs.
 """
 
@@ -28,18 +28,18 @@ MOVEMENTS = 5, 2**25
 """Maximum number of play movements cached for a record, and their total size in bytes."""
 
 DIFFERENCES = 12, 2**25
-"""The same for errors before the free offsets are fitted: each hypothesis of a round is compared with others."""
+"""The same limits for errors before the free offsets are fitted: each hypothesis of a round is compared with others."""
 
 COMPARISONS = 40, 2**23
-"""The same for errors after the free offsets and start states are fitted."""
+"""The same limits for errors after the free offsets and start states are fitted."""
 
 
 ROUNDED = float(np.finfo(np.float64).eps) ** 0.5
-"""Smallest relative change of a value for a difference quotient: it leaves half of the digits for the slope."""
+"""Smallest relative change of a value for a difference quotient: half of the digits remain for the slope."""
 
 
 class Recent:
-    """A cache of the most recently used arrays, by key: at most `most` arrays, of `most_bytes` in total."""
+    """A cache of the most recently used arrays, by key: at most `most` arrays with `most_bytes` in total."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes
@@ -53,7 +53,7 @@ class Recent:
         return found
 
     def kept(self, by: object, make: Callable[[], Array]) -> Array:
-        """The array under a key, made if there is none; the least recently used arrays are dropped for it."""
+        """The array under a key, computed if it is missing; the least recently used arrays are dropped to make room."""
         found = self.recalled(by)
         if found is not None:
             return found
@@ -67,12 +67,12 @@ class Recent:
 
 @dataclass(frozen=True)
 class Item:
-    """A record as it is compared: `y` is NaN at samples left out; `history`: drive values before it, None if unknown.
+    """A record to compare: `y` is NaN at samples left out; `history`: drive values before the record, None if unknown.
 
-    `timed`: whether its times are known. `turns`: drive values that lead virgin plays to the start memory found in
-    place of a history, if any. `session`: all records of the session on one time axis, if they form one; `part`: this
-    record's samples in it. Three caches: `moved`, movements of the plays, which most parameters of a search leave
-    unchanged; `residuals`, errors before the free offsets are fitted; `errors`, errors after that.
+    `timed`: whether the record's times are known. `turns`: drive values that bring virgin plays to the start memory
+    found without a history, if any. `session`: all records on one time axis, if they form a session; `part`: this
+    record's samples in the session. Three caches: `moved`, movements of the plays, which most parameters of a search
+    leave unchanged; `residuals`, errors before the free offsets are fitted; `errors`, errors with fitted offsets.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Item:
 
     @property
     def visited(self) -> tuple[float, ...] | None:
-        """Drive values that lead virgin plays to the start memory, known or found; None if it is neither."""
+        """Drive values that bring virgin plays to the start memory; None if that is neither known nor found."""
         return self.turns if self.history is None else self.history
 
     @cached_property
@@ -109,16 +109,16 @@ class Item:
 
     @property
     def course(self) -> Course:
-        """The record as `identify` compares it."""
+        """The record in the form that `identify` compares."""
         samples = np.flatnonzero(self.known)
         first, last = (int(samples[0]), int(samples[-1]) + 1) if len(samples) else (0, 0)
         start = None if self.turns is None else StartMemory(self.turns, 0.0)
         return Course(self.name, self.run.v, self.y, self.history, first, last, first, start=start)
 
     def step(self, h: Array) -> float:
-        """Step of a predicted output (N,) for the slope of a map, output units.
+        """Step in a predicted output (N,) for the slope of a map, output units.
 
-        The usual share of the measured range, but large enough to survive the rounding of the output: that range is
+        The usual fraction of the measured range, but large enough to survive the rounding of the output: the range is
         zero if the drive rests or only one sample is compared.
         """
         largest = max(float(np.max(np.abs(x), initial=0.0)) for x in (h, self.y[self.known]))
@@ -145,7 +145,7 @@ def compared(items: Sequence[Item]) -> tuple[int, int]:
 
 
 def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
-    """Name of each record, and a mask of its compared samples; its beginning and end may be two items."""
+    """Each record's name and a mask of its compared samples; the two parts of a record may be separate items."""
     found: dict[int, tuple[str, Mask]] = {}
     for item in items:
         _, others = found.get(id(item.run), ("", np.zeros(len(item.known), dtype=bool)))
@@ -168,7 +168,7 @@ class FittedLike(Protocol):
 
 
 def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
-    """Masks of the samples without which the prediction at the others would change noticeably compared with the noise.
+    """Masks of the samples whose omission would change the prediction at the others noticeably relative to the noise.
 
     `errors`: errors of a model over the records, NaN where unknown.
     """
@@ -216,15 +216,14 @@ def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
 
 
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
-    """Groups of records reduced to evenly spaced samples, of which each group compares at most `most`, and the needed
-    samples.
+    """Groups of records thinned to the needed samples and evenly spaced ones, of which each group has at most `most`.
 
     `masks`: the needed samples of each record. If all groups are small enough, they are returned unchanged.
     """
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:
         return [list(group) for group in groups]
-    kept: dict[int, Mask] = {}  # by run, since two items may be parts of one record
+    kept: dict[int, Mask] = {}  # by run, since two items may be parts of the same record
     for group, step, needs in zip(groups, every, masks, strict=True):
         for item, mask in zip(group, needs, strict=True):
             keep = mask.copy()

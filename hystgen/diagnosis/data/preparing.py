@@ -1,4 +1,4 @@
-"""From records to the samples that fits compare: check whole records and samples, set held-out records aside."""
+"""Prepare records for the fits: check whole records and single samples, and set held-out records aside."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ Predict = Callable[[Record], Array]
 class Against:
     """A record's output as `factor * prediction + offset`, with the correlation of the two.
 
-    `sense`: ratio of the measured loop's area to the predicted one's, negative if the output leads the drive, 0 if it
-    is not significant.
+    `sense`: ratio of the measured loop's area to the predicted one's, negative if the output leads, 0 if it is not
+    significant.
     """
 
     factor: float
@@ -59,9 +59,9 @@ class Against:
 
 
 def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
-    """The records that can be used, None in place of the others, and the findings, at most one per record.
+    """The usable records, with None for each of the others, and the findings, at most one per record.
 
-    Exchanged columns are put right; a record in other units, or with the output of another record, is left out. Faulty
+    Swapped columns are put right; a record in other units, or with the output of another record, is left out. Faulty
     samples do not affect these checks.
     """
     kept: list[Record | None] = []
@@ -122,7 +122,7 @@ def _whole(record: Record) -> bool:
 
 
 def _moves(record: Record) -> bool:
-    """Whether a record is whole, and its drive and output move."""
+    """Whether a record is complete and its drive and output move."""
     return _whole(record) and bool(np.ptp(np.asarray(record.y)) > 0.0 and np.ptp(record.v) > 0.0)
 
 
@@ -160,12 +160,12 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 def _area(v: Array, y: Array) -> float:
-    """Area enclosed by (v, y), positive if counterclockwise, as it is if the output lags."""
+    """Area enclosed by (v, y), positive if counterclockwise, as when the output lags."""
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
 
 
 def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
-    """A record with exchanged columns put right, its prediction, and how the two compare."""
+    """A record with swapped columns put right, its prediction, and how the two compare."""
     predicted = predict(record)
     found = _against(record, predicted)
     if found.sense <= 0.0:
@@ -179,9 +179,9 @@ def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, A
 
 
 def _better(swapped: Against, found: Against) -> bool:
-    """Whether a record's columns are exchanged: given the output as its drive, the model predicts the drive.
+    """Whether a record's columns are swapped: given the output as its drive, the model predicts the drive.
 
-    The loop then has the right direction and about the expected size; if none is visible, the sensitivity decides.
+    The loop then has the right direction and about the expected size; if no loop is visible, the sensitivity decides.
     """
     if swapped.correlation < acceptance.FOLLOWS:
         return False
@@ -194,7 +194,7 @@ def _better(swapped: Against, found: Against) -> bool:
 
 
 def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
-    """The record whose prediction the output of record k follows in place of its own, or None."""
+    """The other record whose prediction matches the output of record k where k's own does not, or None."""
     if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
         return None
     y = np.asarray(records[k].y)
@@ -207,19 +207,19 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
 
 
 def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | None:
-    """A finding if the starts, which depend on the history, have far larger errors than the rest, else None.
+    """A finding if errors at the starts, which depend on the history, far exceed those elsewhere; else None.
 
-    `items`: fitted records only, since held-out ones may reach drives at which the fit is a guess. The history precedes
+    `items`: fitted records only, since held-out records may reach drives where the fit is a guess. The history precedes
     each of them, even in a session.
     """
     return _off(*_parts(items, fitted, False))
 
 
 def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherHistory | None:
-    """A finding if a model fitted with the history can follow the starts only at the cost of the other samples.
+    """A finding if a model fitted with the history matches the starts only at the expense of the other samples.
 
-    `free`: the model fitted only to samples that do not depend on the history; it predicts the starts correctly. Starts
-    that are off at no cost to the other samples may show an effect that fades.
+    `free`: the model fitted only to samples that do not depend on the history, which predicts the starts correctly.
+    Errors at the starts that do not affect the other samples may come from an effect that fades.
     """
     starts, rest = _parts(items, free, True)
     _, bent = _parts(items, fitted, True)
@@ -227,7 +227,7 @@ def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherH
 
 
 def _parts(items: Sequence[Item], fitted: FittedLike, own: bool) -> tuple[list[Array], list[Array]]:
-    """Errors that depend on the history, and those that do not; `own`: with the latter's mean subtracted."""
+    """Errors before and after the drive has wiped out the history; `own`: minus the mean of the later errors."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
         if item.history is None:
@@ -314,7 +314,7 @@ def prepare(
                 repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
         edges = np.count_nonzero(unresolved_edges(course.v)[course.first :])
         if edges:
-            notes.append(f"{course.name}: {counted(int(edges), 'sample')} at steps within one or two not compared")
+            notes.append(f"{course.name}: {counted(int(edges), 'sample')} not compared, at jumps of the drive")
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
@@ -323,7 +323,7 @@ def prepare(
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no usable held-out record was given: the last {share} of each is set aside")
     if not all(item.timed for item in (*to_fit, *held)):
-        notes.append("not every record has a time: effects that depend on it are not sought; give --sample-time")
+        notes.append("not every record has a time: time-dependent effects are not tried; give --sample-time")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
@@ -349,15 +349,15 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with start memories if too few samples could be compared without them, and notes on the direction of
-    their loops.
+    """The courses, with start memories if too few samples could be compared without, and notes on their loop
+    directions.
 
-    Otherwise they get none, since the first seconds of an effect may look like a start memory. Fitted records are
-    judged one by one, since the fit needs each; held-out ones are judged together, since a memory found before the
-    effects are known may be wrong by as much as these contribute, an error that no effect then removes.
+    Otherwise no start memory is estimated, since it could absorb the first seconds of an effect. The need is judged for
+    each fitted record, since the fit needs all of them, but for all held-out records together: a memory found before
+    the effects are known may be wrong by the whole contribution of an effect, an error that no effect then removes.
     """
     low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
-    largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist, but hardly move
+    largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist but would hardly move
     begun = start.needed(to_fit, least=acceptance.FEW_COMPARED, largest=largest)
     solution, _ = pi.solve(begun, None, 0.0)
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held), largest)
@@ -365,15 +365,15 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
 
 
 def _reach(courses: Sequence[Course]) -> float:
-    """The largest threshold of the fits: that of a play that moves visibly, even if only at the ends of the range.
+    """The largest threshold for the fits: that of the widest play that moves visibly, if only at the ends of the range.
 
-    With only a fit's usual reach, the motion of wider plays would remain and look like an effect.
+    With a fit's usual largest threshold, the motion of wider plays would remain and look like an effect.
     """
     return pi.largest(courses, pi.LEAST_VISIBLE)
 
 
 def _least(courses: Sequence[Course]) -> float:
-    """Share of a held-out record's samples below which a start memory is estimated for it; 0 if enough samples of all
+    """Fraction of a held-out record's samples below which its start memory is estimated; 0 if enough samples of all
     held-out records together can be compared without one."""
     known = [int(np.count_nonzero(np.isfinite(course.y[course.begin : course.last]))) for course in courses]
     used = [start.unknown(course).used for course in courses]
@@ -382,7 +382,7 @@ def _least(courses: Sequence[Course]) -> float:
 
 
 def _without_faults(ready: Prepared) -> Prepared:
-    """The records without plainly faulty samples, unless hardly any samples would be left."""
+    """The records without plainly faulty samples, unless too few samples would remain."""
     repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
     items, wrong = without_faults([*ready.to_fit, *ready.held], repaired)
@@ -419,7 +419,7 @@ def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples left out only because their output was isolated."""
+    """Samples left out only as isolated samples of the output."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
@@ -443,11 +443,11 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
 
 
 JUDGE = "judge by"
-"""The purpose of held-out records, in words."""
+"""The purpose of held-out records, for messages."""
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether this share of any course is enough to compare, with a start memory if one can be found."""
+    """Whether this fraction of some course is enough to compare, with a start memory if one can be found."""
     return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
 
 
@@ -464,13 +464,12 @@ def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
     if all(start.findable(course) for course in courses) and not enough(courses, share):
         most = max(_comparable(course) for course in courses)
         return (
-            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, but more than "
-            f"{least:.0f} are needed; record more"
+            f"{names}: too few samples to {what}: at most {most} in a record, but more than {least:.0f} are needed; "
+            "record more"
         )
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record after the start, "
-        f"whose memory is unknown, but more than {least:.0f} are needed; give --history, "
-        "or records that sweep their range again"
+        f"{names}: too few samples to {what}: at most {most} in a record after the start, whose memory is unknown, but "
+        f"more than {least:.0f} are needed; give --history, or records that sweep their range again"
     )
 
 
@@ -481,7 +480,7 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
         number = int(np.count_nonzero(compared))
         if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
-                f"{name}: says next to nothing, {counted(number, 'sample')} compared; if its start memory is unknown, "
+                f"{name}: only {counted(number, 'sample')} compared, of little use; if its start memory is unknown, "
                 "give --history, or let it sweep its range again"
             )
         elif np.argmax(compared) > len(compared) // 2:
@@ -495,7 +494,7 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
 def set_aside(records: Sequence[Record]) -> list[int]:
     """Indices of the records to hold out: every third one, shifted if that gives both sides fast and wide drives.
 
-    An effect that shows only at fast edges cannot be found if none are fitted, nor judged if none are held out.
+    An effect that shows only at fast edges cannot be found if no such edge is fitted, nor judged if none is held out.
     """
     rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
     swings = np.array([float(np.ptp(record.v)) for record in records])
@@ -511,19 +510,19 @@ def set_aside(records: Sequence[Record]) -> list[int]:
 
 
 def with_ends(ready: Prepared) -> Prepared | None:
-    """The records with the end of each fitted one held out as well; None if it already is, or is too short."""
+    """The records with the end of each fitted one held out too; None if the ends already are, or are too short."""
     ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
     longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
     if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
         return None
     to_fit, held = parted(ready.to_fit)
     share = f"{100 * acceptance.SET_ASIDE:g} %"
-    note = f"the held-out records alone allow no name: the last {share} of each fitted record is held out too"
+    note = f"the held-out records alone support no name: the last {share} of each fitted record is held out too"
     return replace(ready, to_fit=to_fit, held=[*ready.held, *held], notes=[*ready.notes, note])
 
 
 def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
-    """Every item twice: its beginning to be fitted, its end to be held out."""
+    """The beginning of every item, to be fitted, and its end, to be held out."""
     beginnings, ends = [], []
     for item in items:
         known = np.flatnonzero(item.known)
@@ -544,7 +543,7 @@ Runs = Sequence[tuple[int, int]]
 def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
     """The items without faulty samples, and findings about the faults; `repaired`: findings so far.
 
-    A level that marks a drop-out or the converter's limit in one record does so in all others.
+    A level that marks a drop-out or the converter's limit in one record marks it in all others.
     """
     ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
     dropped = [faults.drop_outs(item.y, item.run.v) for item in items]
@@ -598,7 +597,7 @@ def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[F
 
 
 def _levels(y: Array, runs: Runs) -> set[float]:
-    """Levels of the runs that have a single value."""
+    """Levels of the runs of equal values."""
     return {float(y[a]) for a, b in runs if b - a >= faults.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
 
 

@@ -23,11 +23,12 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise rms in output units by each method that the records allow; `rms`: the one used, `ruled`: its method.
+    """Noise rms in output units from each method that the records allow; `rms`: the value used; `ruled`: the method
+    used.
 
-    Holds show all noise that is faster than they last; repeated periods show everything that does not repeat;
+    Holds show all noise that is fast compared with their length; repeated periods show everything that does not repeat;
     differences show only changes from sample to sample, a lower bound if the noise is coloured. The noise is at least
-    `resolution`: the rounding of the recorded values, or a share of the range that no sensor resolves.
+    `resolution`: the rounding of the recorded values, or a fraction of the range that no sensor resolves.
     """
 
     rms: float
@@ -79,7 +80,7 @@ def still(v: Array, least: int) -> list[tuple[int, int]]:
 
 
 def stands_within(v: Array) -> float:
-    """Largest change from sample to sample of a drive at rest: noise of its measurement, or one code."""
+    """Largest sample-to-sample change of a drive at rest: measurement noise, or one converter code."""
     swing = float(np.ptp(v))
     code = converter_step(v)
     jitter = 1.001 * code if code <= acceptance.COARSE_DRIVE * swing else 0.0
@@ -87,7 +88,7 @@ def stands_within(v: Array) -> float:
 
 
 def _holds(item: Item) -> list[tuple[float, int]]:
-    """Variance and number of samples of each hold, without the part in which it settles."""
+    """Variance and number of samples of each hold after settling."""
     parts = []
     for first, last in still(item.run.v, acceptance.HOLD_SAMPLES):
         begin = first + int(acceptance.HOLD_SETTLING * (last - first))
@@ -108,9 +109,9 @@ def _holds(item: Item) -> list[tuple[float, int]]:
 
 
 def _rings(x: Array) -> bool:
-    """Whether a signal is mostly one oscillation that hardly decays: ringing of the actuator rather than noise.
+    """Whether a signal is mostly one lightly damped oscillation: actuator ringing rather than noise.
 
-    Judged by linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
+    The test is linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
     """
     before = np.column_stack([x[1:-1], x[:-2]])
     (a, b), *_ = np.linalg.lstsq(before, x[2:], rcond=None)
@@ -131,7 +132,7 @@ def _differences(item: Item) -> list[tuple[float, int]]:
 
 
 def _sampled(y: Array) -> Array:
-    """The samples that were really measured, if those between them were held or interpolated; else all."""
+    """The samples actually measured, if those between them were held or interpolated; otherwise all samples."""
     for order in (1, 2):
         changes = np.abs(np.diff(y, order))
         at = np.flatnonzero(changes > UNMEASURED * float(np.ptp(y))) if len(y) > order else np.empty(0, dtype=np.intp)
@@ -142,9 +143,9 @@ def _sampled(y: Array) -> Array:
 
 
 UNMEASURED = 1e-9
-"""[share of the range of the output] Smaller changes count as rounding. Interpolated samples are detected in files with
-12 digits and offsets up to ten times the range, but not in files with 9; second differences of a noise-free sine are
-smaller only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
+"""[fraction of the range of the output] Smaller changes count as rounding. Interpolated samples are detected in files
+with 12 digits and offsets up to ten times the range, but not in files with 9; second differences of a noise-free sine
+are smaller only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
 
 
 def _periods(item: Item) -> list[tuple[float, int]]:
@@ -176,15 +177,15 @@ def _periods(item: Item) -> list[tuple[float, int]]:
 
 
 def reversals(v: Array) -> Places:
-    """Samples at which the drive reverses by more than a share of its range."""
+    """Samples at which the drive reverses by more than a fraction of its range."""
     return _moves(v)[1]
 
 
 def unresolved_edges(v: Array) -> NDArray[np.bool_]:
-    """Samples of jumps of the drive from one level to the next, whose shape between samples is unknown.
+    """Samples at which the drive jumps from one level to the next; its course between these samples is unknown.
 
     A jump within one sample, or two if the converter averages, may begin anywhere in that time, as a step or a ramp.
-    The errors of its samples and of the next one therefore depend on the assumed edge, where even a small lag matters.
+    The errors during the jump and at the next sample depend on the assumed edge, where even a small lag matters.
     """
     swing = float(np.ptp(v))
     step = np.abs(np.diff(v))
@@ -201,7 +202,7 @@ def unresolved_edges(v: Array) -> NDArray[np.bool_]:
 
 
 def one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive moves between the same two ends in all records, without a hold, which would show more."""
+    """Whether the drive moves between the same two ends in all records, without holds, which would add information."""
     ends = []
     for item in items:
         v, t = item.run.v, item.run.t
@@ -225,7 +226,7 @@ def one_speed(items: Sequence[Item]) -> bool:
 
 
 def _moves(v: Array) -> tuple[Places, Places]:
-    """Samples after which the drive moves, and those at which it turns, as seen by a play that ignores its noise."""
+    """Samples after which the drive moves, and samples at which it turns, with its noise removed by a play."""
     z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
     steps = np.diff(z)
     moved = np.flatnonzero(steps)
@@ -233,7 +234,7 @@ def _moves(v: Array) -> tuple[Places, Places]:
 
 
 def _between_ends(turns: Places) -> Places:
-    """The turns without the first one, since the move to it may begin anywhere."""
+    """All turns but the first: the move to the first turn may begin anywhere."""
     return turns[1:] if len(turns) > 1 else turns
 
 
@@ -245,7 +246,7 @@ BESIDE = 2
 
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
-    """Share and frequency (Hz) of narrow peaks of an error that are neither lines of the drive nor its harmonics."""
+    """Power fraction and frequency (Hz) of narrow peaks in an error, except lines of the drive and their harmonics."""
     filled = _filled(item, error)
     if filled is None:
         return []
@@ -269,7 +270,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
     for k, beside, share in narrow:
-        # a line of the drive itself, which may be a weak one among many harmonics
+        # a line of the drive itself, perhaps a weak one among many harmonics
         own = float(np.sum(drive[beside])) >= acceptance.DRIVE_LINE_SHARE * driven
         if own and drive[k] > acceptance.PEAK_HEIGHT * _around(drive, k, acceptance.SURROUNDINGS):
             continue
@@ -298,7 +299,7 @@ def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[
 
 
 def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
-    """Share and frequency of the highest peaks in the mean spectra of a record's parts.
+    """Power fraction and frequency of the highest peaks in the mean spectra of a record's parts.
 
     Ringing that fades is too broad to be a peak in the spectrum of the whole record.
     """
@@ -370,7 +371,7 @@ def _around(power: Array, k: int, reach: int) -> float:
 
 
 def _carrier(power: Array) -> float | None:
-    """Position (bins) of the line with most of a windowed drive's power; None if no line has enough of it."""
+    """Bin of the line with most of a windowed drive's power; None if no line has enough power."""
     k = int(np.argmax(power))
     near = np.arange(max(k - BESIDE, 0), min(k + BESIDE + 1, len(power)))
     held = float(np.sum(power[near]))

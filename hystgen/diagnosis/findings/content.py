@@ -1,4 +1,4 @@
-"""From a search to the result: the effects found and their certainty, the remaining error, and where it is large."""
+"""The result of a search: the effects found and their certainty, the remaining error, and where it is large."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ONE_LOOP = (
     "all records follow one loop, which shows little more than one effect: add smaller loops inside it, other speeds "
     "and holds"
 )
-"""Advice about records of only one loop."""
+"""Advice for records that contain only one loop."""
 
 
 def result_of(
@@ -96,12 +96,12 @@ def _contender(ranked: Ranked, unit: str | None) -> Contender:
 
 
 def reason(refused: Refusal, unit: str | None) -> str:
-    """Why an effect is not named, in words."""
+    """The reason why an effect is not named, as text."""
     return REFUSALS[refused.why].format(value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else "")
 
 
 def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
-    """The error that the withdrawn effects would leave."""
+    """The residual error with the withdrawn effects."""
     them = found.withdrawn
     if them is None:
         return None
@@ -118,25 +118,25 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
 
 
 REFUSALS = {
-    "one_loop": "it leaves {value:.0%} of the gap above the noise; records of one loop allow at most {limit:.0%}",
-    "little": "on equal terms it removes {value:.3g}{unit} rms, and {limit:.3g}{unit} is needed",
-    "chance": "chance explains what it removes from held-out records (p = {value:.1g}, at most {limit:g} is needed)",
-    "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, at most {limit:g} is needed)",
+    "one_loop": "{value:.0%} of the gap above the noise remains; records of one loop allow at most {limit:.0%}",
+    "little": "on equal terms it removes {value:.3g}{unit} rms, but {limit:.3g}{unit} is needed",
+    "chance": "its gain on held-out records may be due to chance (p = {value:.1g}, must be at most {limit:g})",
+    "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, must be at most {limit:g})",
     "small": "it removes {value:.0%} of the gap, but a name needs {limit:.0%}",
-    "most": "the effects found leave {value:.3g}{unit} rms, most of the former {limit:.3g}{unit}",
-    "above": "the effects found leave {value:.3g}{unit} rms; records of one loop allow at most {limit:.3g}{unit}",
-    "given": "the effects found leave {value:.3g}{unit} rms, but the model as given only {limit:.3g}{unit}",
-    "identified": "the effects found leave {value:.3g}{unit} rms, but the model of `identify` only {limit:.3g}{unit}",
+    "most": "with the effects, {value:.3g}{unit} rms remains, most of the former {limit:.3g}{unit}",
+    "above": "with the effects, {value:.3g}{unit} rms remains; records of one loop allow at most {limit:.3g}{unit}",
+    "given": "with the effects, {value:.3g}{unit} rms remains, but only {limit:.3g}{unit} with the model as given",
+    "identified": "with the effects, {value:.3g}{unit} rms remains, but only {limit:.3g}{unit} with that of `identify`",
     "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
-    "grows": "with a time constant of {value:.3g} s it only grows in {limit:.3g} s of records, as disturbances may",
-    "range": "with a parameter at an end of its range, the effects found leave {value:.0%} of the gap above the noise, "
-    "but may then leave at most {limit:.0%}",
-    "forgets": "hysteresis other than a play sum explains the error as well or better and leaves {value:.3g}{unit} rms",
-    "wild": "its inverse moves the output of the plain model by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
+    "grows": "with a time constant of {value:.3g} s it only grows during {limit:.3g} s of records, as disturbances can",
+    "range": "{value:.0%} of the gap above the noise remains; with a parameter at an end of its range, "
+    "at most {limit:.0%} may",
+    "forgets": "hysteresis other than a play sum explains the error at least as well: {value:.3g}{unit} rms remains",
+    "wild": "its inverse changes the plain model's output by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
     "other": "another shape does better, or as well with fewer parameters",
 }
-"""Why an effect that was tried is not named, in words."""
+"""Reasons why an effect that was tried is not named, as text."""
 
 
 def _in_digits(value: object) -> object:
@@ -157,7 +157,7 @@ def _in_digits(value: object) -> object:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """The remaining error that is neither noise nor a fault of the recording; `usual`: error on fitted records."""
+    """The remaining error beyond noise and recording faults; `usual`: error on fitted records."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
@@ -220,7 +220,7 @@ def _evidence(each: Found, refitted: float, noise: float) -> str:
     said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
     if is_noise(each.after, noise) or not refitted:
         return said
-    return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap are left"
+    return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap remain"
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
@@ -235,17 +235,17 @@ def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
 
 
 DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
-"""Thresholds of the plays that represent memory, as shares of the drive range."""
+"""Thresholds of the plays that represent memory, as fractions of the drive range."""
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants, in samples, of the averages of the drive that represent rates and creep."""
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""[share of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each about
-three times the previous one, from the smallest play up to five ranges. They explain 0.55 of the error that plays leave
-on a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep they never explain more than 0.09. Set by:
-benchmarks/chosen_numbers.py lengths."""
+"""[fraction of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each
+about three times the previous one, from the smallest play up to five ranges. Six lengths explain 0.55 of a play model's
+residual variance on a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep, none of these explains more than 0.09.
+Set by: benchmarks/chosen_numbers.py lengths."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +269,7 @@ def displacement(item: Item) -> Array:
 
 
 def travel(item: Item) -> Array:
-    """Distance that the drive has travelled since the session began, as far as the records show it."""
+    """Distance that the drive has travelled since the session began, as far as recorded."""
     whole = item.session or item.run
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(whole.v)))])[item.part]
 
@@ -329,8 +329,8 @@ def described(
 
 
 def _rate_free(free: float, with_rates: float) -> bool | None:
-    """Whether drive and memory explain the error without rates; None if nothing explains much of it, or if rates add
-    little to a small share."""
+    """Whether drive and memory explain the error without rates; None if nothing explains much of the error, or if rates
+    add little to a small explained fraction."""
     if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
         return None
     if free > acceptance.RATE_FREE_SHARE * with_rates:
@@ -339,9 +339,9 @@ def _rate_free(free: float, with_rates: float) -> bool | None:
 
 
 def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[str, float]]:
-    """Shares of the errors' variance that a smooth function of one variable explains on samples it was not fitted to.
+    """Fractions of the error variance that a smooth function of one variable explains on samples it was not fitted to.
 
-    Returns the largest share, and those of the variables that matter.
+    Returns the largest fraction, and the fractions of the variables that matter.
     """
     found = {each.name: _share([each.of(item) for item in items], errors) for each in VARIABLES}
     mattering = {name: round(share, 4) for name, share in found.items() if share > acceptance.VARIABLE_SHARE}
@@ -349,7 +349,7 @@ def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[
 
 
 def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
-    """Cross-validated share explained by one variable: means over bins with equal numbers of samples."""
+    """Cross-validated fraction explained by one variable through its means over bins with equal numbers of samples."""
     x = np.concatenate([v[np.isfinite(e)] for v, e in zip(values, errors, strict=True)])
     e = np.concatenate([e[np.isfinite(e)] for e in errors])
     if len(e) < acceptance.DESCRIBED_SAMPLES or np.ptp(x) == 0.0:
@@ -372,11 +372,11 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over its travel),
+    """Cross-validated fractions explained by rate-free variables (drive, plays, averages of the drive over its travel),
     and by these together with averages over several times, which represent rates and creep.
 
-    The error of hysteresis that plays cannot follow depends on both kinds of averages; only the gain from the second
-    kind is due to rates.
+    Hysteresis that plays cannot follow causes an error that depends on both kinds of averages; only the second kind's
+    gain is due to rates.
     """
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)
@@ -411,7 +411,7 @@ def _averaged(v: Array, decay: float) -> Array:
 
 
 def _averaged_over_travel(v: Array, length: float) -> Array:
-    """The same over the drive's travel: independent of the rate, and constant while the drive rests."""
+    """Averages over the drive's travel: independent of the rate, and constant while the drive rests."""
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
     if travelled[-1] == 0.0:
         return v
@@ -423,7 +423,7 @@ def _averaged_over_travel(v: Array, length: float) -> Array:
 
 
 def _regressed(x: Array, e: Array) -> float:
-    """Cross-validated share of e (N,) explained by a linear regression on rows x (k, N) with a small ridge."""
+    """Cross-validated fraction of e (N,) explained by a linear regression on rows x (k, N) with a small ridge."""
     fold = _folds(len(e))
     unexplained = 0.0
     for k in (0, 1):
@@ -435,7 +435,7 @@ def _regressed(x: Array, e: Array) -> float:
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Share of the error's variance that recurs when the drive repeats itself; None if the drive never does."""
+    """Fraction of the error's variance that recurs when the drive repeats itself; None if the drive does not repeat."""
     products = powers = 0.0
     count = 0
     for item, error in zip(items, errors, strict=True):
@@ -454,7 +454,7 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 
 
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Even share of the mean error over drive and direction: the part unchanged when both are reversed.
+    """Even fraction of the mean error over drive and direction: the part unchanged when both are reversed.
 
     None if that mean is small compared with the error.
     """

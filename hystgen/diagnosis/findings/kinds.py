@@ -16,7 +16,7 @@ INTERPOLATION = "the sensor's interpolation error looks like this"
 class Finding(ABC):
     """An entry of `unexplained`.
 
-    `kind`: its name in `diagnosis.json`; `optional`: keys that are left out there if they are None or False.
+    `kind`: the finding's name in `diagnosis.json`; `optional`: keys omitted from that file if they are None or False.
     """
 
     kind: ClassVar[str]
@@ -36,15 +36,15 @@ class Finding(ABC):
         """The entry as a sentence without a full stop; `unit`: of the displacement."""
 
     def advice(self) -> list[str]:
-        """Experiments that would reveal more about it, one sentence each."""
+        """Experiments that would reveal more about the finding, one sentence each."""
         return []
 
 
 @dataclass(frozen=True)
 class Fault(Finding):
-    """A recording fault that is left out of the comparison or put right; the rest of the record is sound.
+    """A fault in part of a recording, left out of the comparison or put right; the rest of the record is sound.
 
-    `noun`: the noun counted in a sentence; `qualifier`: the words after it.
+    `noun`: the noun counted in its sentence; `qualifier`: the words after the noun.
     """
 
     noun: ClassVar[str]
@@ -52,7 +52,7 @@ class Fault(Finding):
 
     @property
     def times(self) -> int:
-        """How often it occurred: its `count`, or 1."""
+        """How often the fault occurred: its `count`, or 1."""
         return int(getattr(self, "count", 1))
 
 
@@ -61,21 +61,21 @@ class Fault(Finding):
 
 @dataclass(frozen=True)
 class SwappedChannels(Fault):
-    """A record with drive and displacement exchanged, which was put right."""
+    """A record whose drive and displacement columns were swapped and have been put right."""
 
-    kind, noun, qualifier = "swapped_channels", "record", " with exchanged columns"
+    kind, noun, qualifier = "swapped_channels", "record", " with swapped columns"
     record: str
     repaired: bool = True
 
     def sentence(self, unit: str | None) -> str:
         return (
-            f"{self.record}: drive and displacement are exchanged (the model fits them the other way round); put right"
+            f"{self.record}: drive and displacement were swapped (the model fits them the other way round); put right"
         )
 
 
 @dataclass(frozen=True)
 class ExchangedRecords(Finding):
-    """A record with the output of another one, which was left out."""
+    """A record that was left out because it has the output of another record."""
 
     kind = "exchanged_records"
     record: str
@@ -107,7 +107,7 @@ class Scale(Finding):
 
 @dataclass(frozen=True)
 class OtherHistory(Fault):
-    """A given history that the starts of the records contradict: rms errors of the starts and of the rest."""
+    """A given history that the starts of the records contradict: rms errors at the starts and elsewhere."""
 
     kind, noun, qualifier = "history", "history", " that the starts contradict"
     record: str
@@ -129,7 +129,7 @@ class OtherHistory(Fault):
 
 @dataclass(frozen=True)
 class Saturated(Fault):
-    """Samples at a limit of the converter; `first`: time of the first one, s; `end`: `largest` or `least`."""
+    """Samples at a limit of the converter; `first`: time of the first such sample, s; `end`: `largest` or `least`."""
 
     kind, noun, qualifier = "saturated", "sample", " at the converter's limit"
     optional = frozenset(("first", "end", "level"))
@@ -146,7 +146,7 @@ class Saturated(Fault):
 
 @dataclass(frozen=True)
 class DropOuts(Fault):
-    """Stretches in which the output was lost; `level`: its value there, if it was constant."""
+    """Stretches in which the output was lost; `level`: value of the lost output, if constant."""
 
     kind, noun = "drop_outs", "drop-out"
     optional = frozenset(("level",))
@@ -198,7 +198,7 @@ class IsolatedSamples(Fault):
 
 @dataclass(frozen=True)
 class Line(Finding):
-    """A spectral line at a frequency, Hz; `share`: of the error's variance in the `records` that have it."""
+    """A spectral line at a frequency, Hz; `share`: its fraction of the error variance in the `records` that show it."""
 
     kind = "line"
     optional = frozenset(("mains", "repaired"))
@@ -211,7 +211,7 @@ class Line(Finding):
 
     @property
     def place(self) -> float:
-        """Its position on the frequency axis, Hz."""
+        """The line's position on the frequency axis, Hz."""
         return self.frequency
 
     def sentence(self, unit: str | None) -> str:
@@ -239,7 +239,7 @@ class Ripple(Finding):
 
     @property
     def place(self) -> float:
-        """Its position on the axis of pitches, output units."""
+        """The ripple's position on the axis of pitches, output units."""
         return self.pitch
 
     def sentence(self, unit: str | None) -> str:
@@ -257,7 +257,7 @@ Periodic = Line | Ripple
 
 @dataclass(frozen=True)
 class StickSlip(Finding):
-    """Jumps of the output after a standstill: their number, the time of the first one (s) and their median size."""
+    """Jumps of the output after a standstill: their number, the time of the first jump (s) and their median size."""
 
     kind = "stick_slip"
     record: str
@@ -275,12 +275,12 @@ class StickSlip(Finding):
 
 @dataclass(frozen=True)
 class NotAPlaySum(Finding):
-    """Hysteresis that forgets all along the drive's travel, not only where minor loops close.
+    """Hysteresis that forgets continuously as the drive travels, not only where minor loops close.
 
-    `before`: held-out rms that plays and named effects leave; `after`: the same with an added element that forgets over
-    `way`, a share of the drive range; `open`: gap left by a minor loop over a tenth of the range, as a share of its
-    height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive covers equal
-    distances in different times.
+    `before`: held-out rms error with plays and named effects; `after`: the same with an added element that forgets over
+    `way`, a fraction of the drive range; `open`: gap left by a minor loop over a tenth of the range, as a fraction of
+    its height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive covers
+    equal distances in different times.
     """
 
     kind = "not_a_play_sum"
@@ -299,14 +299,14 @@ class NotAPlaySum(Finding):
         )
         return (
             f"the hysteresis is not a play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height if "
-            f"they span a tenth of the drive range, and depend on what came before. A part that forgets over "
+            f"they span a tenth of the drive range, and depend on the earlier drive. A part that forgets over "
             f"{100.0 * self.way:.2g} % of the range reduces the held-out rms error from {self.before:.4g} to "
             f"{self.after:.4g}{_unit(unit)}{instead}"
         )
 
     def advice(self) -> list[str]:
-        """Where to read how much a play sum leaves on such a stage, and how to separate effects of speed."""
-        page = "docs/plants.md shows how much a play sum leaves on a stage with such hysteresis"
+        """Where to read about the residual error on such a stage, and how to identify speed-dependent effects."""
+        page = "docs/plants.md shows the residual error of a play sum on a stage with such hysteresis"
         if self.shows_speed:
             return [page]
         return [page, "record the same path at two speeds: a lag, creep and rate dependence then differ from it"]
@@ -316,9 +316,9 @@ class NotAPlaySum(Finding):
 class WildInverse(Finding):
     """Effects that were found but are not written, since their inverse does more than the recordings support.
 
-    `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model; `other`:
-    the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: ratio of the second
-    differences of its drive to those of the plain inverse's drive.
+    `moves`: rms change that the inverse with the effects causes in the plain model's output, over recorded outputs;
+    `other`: the same with the two models exchanged; `gain`: held-out rms that the effects explain; `wilder`: second
+    differences of its drive, divided by those of the plain inverse's drive.
     """
 
     kind = "wild_inverse"
@@ -348,12 +348,12 @@ VARIABLE_NAMES = {
 
 @dataclass(frozen=True)
 class Structured(Finding):
-    """An error that is not noise and that no effect removes.
+    """An error above the noise that no effect removes.
 
-    `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples not used to fit
-    them; `main_variable`: the variable with the largest share, None if none matters; `rate_free`, `repeatable`: None if
-    the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive and
-    direction; `held_out_alone`: held-out records that show it although the fitted ones do not.
+    `share_by_variable`: fractions of its variance that smooth functions of one variable explain on samples not used to
+    fit them; `main_variable`: the variable with the largest fraction, None if none matters; `rate_free`, `repeatable`:
+    None if the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive
+    and direction; `held_out_alone`: held-out records that show the error although no fitted record does.
     """
 
     kind = "structure"
@@ -369,10 +369,10 @@ class Structured(Finding):
 
     def sentence(self, unit: str | None) -> str:
         times = f", {times_noise(self.above_floor)}" if self.above_floor else ""
-        return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
+        return f"an error of {self.rms:.3g}{_unit(unit)} rms remains{times}; it {self.words()}"
 
     def words(self) -> str:
-        """The dependence of the error, as a predicate."""
+        """What the error depends on, as a predicate."""
         parts = []
         if self.main_variable:
             share = 100.0 * self.share_by_variable[self.main_variable]
@@ -392,7 +392,7 @@ class Structured(Finding):
 
     def advice(self) -> list[str]:
         advice = []
-        if self.held_out_alone:  # never fitted, so an effect that only they show cannot be found
+        if self.held_out_alone:  # never fitted, so an effect that shows only in these cannot be found
             alone = several(self.held_out_alone)
             advice.append(f"fit {alone} too and hold out others: the remaining error shows only in held-out records")
         if self.rate_free is None:
@@ -405,7 +405,7 @@ class Structured(Finding):
 
 
 EVEN = 0.3, 0.7
-"""Even shares below which an error is called odd, and above which it is called even."""
+"""Even fractions below which an error is called odd, and above which it is called even."""
 
 
 # Words -------------------------------------------------------------------------------------------------------
@@ -433,12 +433,13 @@ def several(names: Sequence[str]) -> str:
 
 
 MANY = 100.0
-"""[times the noise] Larger ratios are not stated as figures: two digits end here, and the noise, which is only an
-estimate, supports no more. Only wording depends on it. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
+"""[times the noise] Larger ratios are not printed as numbers: they would need three digits, more than the estimated
+noise supports. Only the wording depends on this number. Changed by:
+report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:
-    """An error as a multiple of the noise, in words."""
+    """An error as a multiple of the noise, as text."""
     return f"{float(f'{ratio:.2g}'):g} times the noise" if ratio <= MANY else f"more than {MANY:g} times the noise"
 
 
@@ -455,4 +456,4 @@ def _not_compared(samples: int, first: float | None) -> str:
 
 
 def _taken_out(repaired: bool) -> str:
-    return "; taken out of the records before effects were sought" if repaired else ""
+    return "; removed from the records before the search for effects" if repaired else ""

@@ -48,20 +48,20 @@ class Gap:
 NO_WIDER = {
     "limit": "a wider range changes nothing",
     "firm": "its range is not widened",
-    "noise": "only noise is left",
+    "noise": "only noise remains",
 }
-"""Why no wider range was tried, in words."""
+"""Reasons why no wider range was tried, as text."""
 
 
 @dataclass(frozen=True)
 class AtEnd:
-    """A parameter of an effect that is at an end of its range, or beyond it.
+    """An effect's parameter that is at or beyond an end of its range.
 
     `key`, `value`: as in the parameter file; `end`: `least` or `largest`; `usual`: value at that end of the usual
     range; `reached`: value at that end of the widest range that was tried and failed, or None; `leaves`: held-out rms
-    error that this range left, or None; `why`: `beyond`, less error is left beyond the usual range; `no less`, a wider
-    range leaves no less; `limit`, no wider range is possible; `firm`, ranges of the nominal model and of your own
-    effects are not widened; `noise`, only noise is left, so no wider range was tried.
+    error with that range, or None; `why`: `beyond`, the error is smaller beyond the usual range; `no less`, a wider
+    range does not reduce the error; `limit`, no wider range is possible; `firm`, ranges of the nominal model and of
+    your own effects are not widened; `noise`, the error is down to noise, so no wider range was tried.
     """
 
     key: str
@@ -87,10 +87,10 @@ class AtEnd:
 
 @dataclass(frozen=True)
 class Withdrawn:
-    """Effects that were accepted one by one but withdrawn in the end: the error they leave, and why.
+    """Effects that were accepted one by one but withdrawn in the end: the error with them, and the reason.
 
-    `before`, `after`: rms errors without and with them, on equal terms, output units; `left`: shares of the gap above
-    the noise that they leave, None if there is no gap.
+    `before`, `after`: rms errors without and with the effects, on equal terms, output units; `left`: fractions of the
+    gap above the noise that remain, None if there is no gap.
     """
 
     names: tuple[str, ...]
@@ -107,16 +107,16 @@ WRITTEN = {
     "given": "the model as given",
     "identified": "the model of `identify --model auto`",
 }
-"""The model in `params.yaml`, in words."""
+"""Descriptions of the model in `params.yaml`."""
 
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was found: `parameters` as in its entry of a parameter file, with 95 % `intervals`.
+    """An effect that was found: `parameters` as in a parameter file, with 95 % `intervals`.
 
-    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
-    `at_an_end`: whether one of its parameters is at an end of its range, or two of its parts coincide, so that its
-    shape is not certain; `ends`: those parameters.
+    `share_of_gap`: the held-out error that the effect removes, as a fraction of the refitted model's; errors in output
+    units; `at_an_end`: whether a parameter is at an end of its range or two parts of the effect coincide, so that its
+    shape is not certain; `ends`: the parameters at an end.
     """
 
     name: str
@@ -143,7 +143,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A shape of an effect that was fully fitted, with its rms errors; `refused`: why it is not named, or None."""
+    """A fully fitted shape of an effect, with its rms errors; `refused`: why the effect is not named, or None."""
 
     name: str
     shape: str
@@ -235,10 +235,10 @@ class Diagnosis:
         return Model(self.parameters)
 
     def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Figure:
-        """A figure of the report, by default how each effect shrinks the held-out error.
+        """A figure from the report; the default shows how each effect reduces the held-out error.
 
-        `which`: gap, overlay, records, time, against or frequency. Returns matplotlib's Figure, which a notebook shows;
-        with `path`, a .png or .svg, it is written there as well. Raises ValueError, PlotError, OSError.
+        `which`: gap, overlay, records, time, against or frequency. Returns a matplotlib Figure, which a notebook
+        displays; with `path`, it is also written to that .png or .svg file. Raises ValueError, PlotError, OSError.
         """
         arguments.choice("which", which, tuple(self.figures))
         return drawing.picture(partial(self.figures[which], self), path)
@@ -309,11 +309,11 @@ class Diagnosis:
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
             whose = WRITTEN[result.written]
-            return f"Nothing is missing: {whose} leaves {after} rms on held-out records, which is noise"
+            return f"Nothing is missing: the held-out rms error of {whose} is {after}, which is noise"
         where, left = "", gap.after.holdout
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " on the fitted records", gap.after.fit
-        missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
+        missing = f"{self._missing()}: {self._rms(left)} rms remains{where}{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structured | NotAPlaySum)]
         if not disturbing:
             return missing
@@ -339,10 +339,10 @@ class Diagnosis:
             return ""
         if self.result.withdrawn is not None and not self._limits():
             return f". {self._withdrawn(self.result.withdrawn)}"
-        return f". The closest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+        return f". The closest is {closest.name}, with a residual of {self._rms(closest.holdout)}; {closest.refused}"
 
     def _withdrawn(self, found: Withdrawn) -> str:
-        """The error that the withdrawn effects would leave, and why they were withdrawn."""
+        """The residual error with the withdrawn effects, and why they were withdrawn."""
         named = " and ".join(found.names)
         left = [
             f"{self._rms(after)} of {self._rms(before)} rms on {records} records"
@@ -381,7 +381,7 @@ class Diagnosis:
         return ""
 
     def _name(self, name: str) -> str:
-        """The name of an effect, and of those that cannot be separated from it."""
+        """An effect's name, with the names of effects that cannot be separated from it."""
         others = [other for one, other in self.result.not_separable if one == name]
         return f"{name} (or {' or '.join(others)})" if others else name
 
@@ -390,7 +390,8 @@ class Diagnosis:
         return json.dumps(self.content, indent=2, allow_nan=False) + "\n"
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, all or nothing; returns the paths.
+        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, either all files or none; returns the
+        paths.
 
         Raises PlotError without matplotlib.
         """

@@ -29,12 +29,13 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 POLISHED = 1e-5
-"""A search ends after a step that lowers the error by a smaller share: far below any difference that matters."""
+"""A search ends after a step that lowers the error by less than this fraction, far below any difference that
+matters."""
 
 COARSE = 1e-3
-"""[share of the error] The same for a search that only ranks shapes, or shows whether to go on: far below `BETTER`. For
-any value from 1e-4 to 1e-2, eight cases of `benchmarks.second_plants` (seeds 29000 on) yield the same effect names, and
-errors within 0.5 %."""
+"""[fraction of the error] The same limit for a search that only ranks shapes or shows whether to go on: far below
+`BETTER`. For any value from 1e-4 to 1e-2, eight cases of `benchmarks.second_plants` (seeds 29000 on) yield the same
+effect names, and errors within 0.5 %."""
 
 CROSSINGS = 2
 """[changes of side] A start component that moves from one limit past the other is then measured from the other; after
@@ -43,14 +44,14 @@ records with two nearly equal time constants ended up to 8e-4 above the smallest
 1e-6 (`test_start_transients::test_nearly_equal_responses`, seeds 0 to 599)."""
 
 RESTARTS = 4
-"""[searches] Maximum number for start memories with the same effects. Another follows only if the last lowered the
-error by `BETTER`, so this only bounds the time."""
+"""[searches] Maximum number of searches for start memories with the same effects. Another search follows only if the
+last one lowered the error by `BETTER`, so this number only bounds the time."""
 
 
 class _Block:
     """A record's part of the system linearised about a shape and weights: plays and measured output, then derivatives.
 
-    The factors of the free components are within the limits of `Actuator.largest`, each a share `most` of the sum of
+    The factors of the free components are within the limits of `Actuator.largest`, each a fraction `most` of the sum of
     the weights. A component that would exceed its limit is written as `side most (sum p - slack)` with `slack >= 0`, so
     that the limit follows the weights in the same linear system. The reflections of the reduction are kept, so that the
     derivatives can be reduced separately later. `like`: the actuator whose components are free, if not `here`.
@@ -125,7 +126,7 @@ class _Block:
     def _begun(self, other: Actuator) -> Array:
         """The response to the start state with other parameters; a factor at its limit follows the limit."""
         free = other.nuisances(self._item, self._offset)
-        if len(free) != self._free:  # a spectrum with another number of states
+        if len(free) != self._free:  # another spectrum may have another number of states
             return self._begun(self._here)
         held, factors = self.held, self._factors.copy()
         factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
@@ -177,8 +178,8 @@ def _stacked(triangles: Sequence[Array]) -> Array:
 def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
     """The system of all records and its best weights, with the free components of each record within their limits.
 
-    A component found beyond a limit gets a slack from it, solved for with the weights (nnls), until none is beyond.
-    This terminates, since each keeps its slack until it has changed sides `CROSSINGS` times.
+    A component found beyond a limit gets a slack from it, solved for with the weights (nnls), until none is beyond its
+    limit. The iteration terminates, since a component keeps its slack until it has changed sides `CROSSINGS` times.
     """
     whole = reduction.triangle(*(block.system() for block in blocks))
     solution = pi.non_negative(whole, np.arange(plays))
@@ -298,7 +299,7 @@ class Search:
         return replace(self, now=now, damping=damping)
 
     def found(self, otherwise: Array) -> Fitted:
-        """The fit; `otherwise`: its weights if no weights can be solved for with these parameters."""
+        """The fit; `otherwise`: its weights if the weights cannot be solved for with these parameters."""
         best = self.now.best if math.isfinite(self.now.rms) else otherwise
         return Fitted(self.structure, self.now.shape, best, self.now.rms)
 
@@ -309,7 +310,7 @@ def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -
 
 
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
-    """The end of a search from a start; `p`: weights close to the best ones."""
+    """The fit at the end of a search from a start; `p`: weights close to the best ones."""
     return begun(structure, items, start, p).further().found(p)
 
 
@@ -321,7 +322,7 @@ def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitt
     return replace(fitted, weights=best) if np.isfinite(whole).all() else fitted
 
 
-# Start memories beside the effects ---------------------------------------------------------------------------
+# Start memories in the presence of effects -------------------------------------------------------------------
 
 
 def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
@@ -357,7 +358,7 @@ def restarts(item: Item) -> bool:
 
 
 def _turns(fitted: Fitted, item: Item) -> Turns | None:
-    """Drive values that lead virgin plays to the start memory that fits an item best; None if none is found."""
+    """Drive values that bring virgin plays to the start memory that fits an item best; None if none is found."""
     actuator, r, p = fitted.actuator, fitted.structure.thresholds, fitted.weights
     seen = actuator.course(item, actuator.error(item, p))
     alone = replace(seen, y=seen.y + reduction.prediction(seen.v, seen.history, r, p), history=None)
@@ -366,7 +367,7 @@ def _turns(fitted: Fitted, item: Item) -> Turns | None:
 
 
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:
-    """A hypothesis with p_0 raised to a share `floor` of the sum of weights if the records allow it, and its weights.
+    """A hypothesis and its weights, p_0 raised to a fraction `floor` of the sum of weights if the records allow it.
 
     As in `identify` (`pi.fit_weights`); all other parameters stay.
     """
@@ -394,14 +395,14 @@ HALVINGS = 20
 """Bisections between the fitted shape and an inadmissible one, down to a millionth of an interval's width."""
 
 WEAKEST = 1e-9
-"""Singular values below this share of the largest are raised to it, since their directions are undetermined."""
+"""Singular values below this fraction of the largest are raised to it, since their directions are undetermined."""
 
 Numbers = Mapping[str, object]
 
 
 @dataclass(frozen=True)
 class Sure:
-    """Low and high end of every parameter, keyed as in the entries, for the front's stage and for each part."""
+    """Ends of every parameter's interval, keyed as in the entries, for the front's stage and for each part."""
 
     front: dict[str, object]
     parts: tuple[dict[str, object], ...]
@@ -423,7 +424,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
 
     The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), with J the
     Jacobian of the free-run error with respect to weights and parameters together, zero weights kept at zero; `tau`,
-    the correlation time of the residuals in samples, turns their number into the effective one. The intervals come from
+    the correlation time of the residuals in samples, converts their number to an effective one. The intervals come from
     shapes drawn with this covariance and kept within the bounds.
     """
     shape, p = fitted.shape, fitted.weights
@@ -436,7 +437,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
     # only the parameters' part of the covariance is needed; its triangular root with a positive diagonal is unique,
-    # unlike singular vectors, whose signs and order depend on the library and would lead to other draws
+    # unlike singular vectors, whose signs and order depend on the library and would change the draws
     root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
     root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)

@@ -1,9 +1,9 @@
 """Whether the hysteresis departs from a play sum: minor loops stay open and depend on the past, at any speed.
 
-A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little
-all along the drive's travel. An element that does so is fitted beside the plays like an effect, and judged by the same
-rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are equivalent: the
-element can then replace creep, a lag or a rate dependence, and they can replace it.
+A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget gradually
+as the drive travels. An element that does so is fitted in parallel with the plays, like an effect, and judged by the
+same rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are equivalent:
+the element can then replace creep, a lag or a rate dependence, and vice versa.
 """
 
 from __future__ import annotations
@@ -38,24 +38,24 @@ BALANCE = 0.9
 
 WEIGHT = 5.0
 """[mean slopes of the records] Largest magnitude of the weight: friction of five times the stage's stiffness has no
-inverse. It is negative, so that the output lags; with a positive one, it would lead."""
+inverse. The weight is negative, so that the output lags; with a positive weight, it would lead."""
 
 LOOP = 0.1
-"""[share of the drive range] Width of the minor loop that is reported to stay open, as in `docs/plants.md`."""
+"""[fraction of the drive range] Width of the minor loop that is reported to stay open, as in `docs/plants.md`."""
 
 WITHIN = 0.01, 1.0
-"""[shares of the drive range] Smallest and largest distance over which the element forgets: below, it acts like plays
-of the smallest thresholds; above, like a straight line and a memory of the start."""
+"""[fractions of the drive range] Smallest and largest distance over which the element forgets: below, it acts like
+plays of the smallest thresholds; above, like a straight line and a memory of the start."""
 
 STARTS = 5
 """[widths] Number of widths from which a search starts, each about three times the previous one."""
 
 STEPS = 12
-"""[steps] Maximum for the search from the best width: six usually settle three parameters and the linear weights."""
+"""[steps] Maximum in the search from the best width: six usually settle three parameters and the weights."""
 
 
 class Forgetting(Effect):
-    """Bouc-Wen's element beside the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
+    """The Bouc-Wen element in parallel with the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
 
     With the balance b = 1 it is Dahl's friction element, the average of the drive's direction over its travel.
     """
@@ -78,11 +78,11 @@ class Forgetting(Effect):
 
 
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
-    """The element, if the records support it in addition to the effects found, or rather than them; else None.
+    """The element, if the records support it in addition to the effects found or instead of them; else None.
 
-    The element is first tried in place of all effects of the `outcome`, then of those that depend on time, then in
-    addition to all. Effects that explain more are kept. If only chance separates the two, the effects are kept if the
-    drive covers equal distances in different times, since effects of time and of travel then differ.
+    The element first replaces all effects of the `outcome`, then only those that depend on time; then it is tried in
+    addition to all. Effects that explain more than the element are kept. If the difference may be chance, the effects
+    are kept if the drive covers equal distances in different times, since effects of time and of travel then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
@@ -145,7 +145,7 @@ def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> O
 
 
 def shows_speed(items: Sequence[Item]) -> bool:
-    """Whether the drive covers about equal distances from one turn to the next in different times."""
+    """Whether the drive takes different times for about equal distances between turns."""
     moves = []
     for item in items:
         at = signals.reversals(item.run.v)
@@ -163,7 +163,7 @@ def shows_speed(items: Sequence[Item]) -> bool:
 
 
 def _element(now: Fitted, records: Records) -> Tried:
-    """The hypothesis with the element, started at the best of several widths and fitted as far as ranking needs."""
+    """The hypothesis with the element, started at the best of several widths and fitted well enough for ranking."""
     low, high = records.known.drive
     wide, slope = high - low, records.known.output_range / (high - low)
 
@@ -225,7 +225,7 @@ def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, recor
 
 
 def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
-    """Gap left by a minor loop in the middle of the drive range, as a share of its height; 0 with plays alone."""
+    """Gap left by a minor loop in the middle of the drive range, as a fraction of its height; 0 with plays alone."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)
     v = np.array([low, high, low, end, begin, end])

@@ -1,8 +1,8 @@
 """Whether the inverse of a model with effects does more than the recordings support.
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
-model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the
-error under the other's compensator. A correct effect changes the output by about as much as it explains.
+model, and the plain inverse's drive into the model with effects: if one model were the stage, this would be the error
+with the other model's compensator. A correct effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Wild:
     """An inverse that does more than the recordings support.
 
     `moves`: rms difference between the reference and the plain model's output for its drive; `other`: the same with the
-    two models exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: rms second
-    difference of its drive over that of the plain inverse's drive.
+    two models exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: its drive's rms
+    second difference, divided by that of the plain inverse's drive.
     """
 
     moves: float
@@ -48,7 +48,8 @@ class Wild:
 
 
 def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
-    """How far the inverse with effects exceeds their `gain` in the worst held-out record; None if it does not.
+    """How far the inverse's changes exceed the effects' `gain` in the worst held-out record; None if they stay within
+    it.
 
     The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
@@ -60,7 +61,7 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
 
 def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
-    """The two inverses over one record; None if one of them fails or too few samples are compared."""
+    """The two inverses over one record; None if an inverse fails or too few samples are compared."""
     end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]
@@ -97,7 +98,7 @@ def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
 
 
 def _smooth(y: Array) -> Array:
-    """Moving average over a few samples, applied twice, so that noise hardly shows in second differences."""
+    """Moving average over a few samples, applied twice, so that second differences contain little noise."""
     n = SMOOTHED
     kernel = np.ones(n) / n
     for _ in range(2):

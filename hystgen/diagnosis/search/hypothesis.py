@@ -48,8 +48,8 @@ LEVEL_STEPS = 3
 
 
 RANK = 1e-10
-"""[share of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
-reduction keeps them to 2e-16 of the largest, so one of this size still has six digits. Set by:
+"""[fraction of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
+reduction keeps singular values to 2e-16 of the largest, so a value of this size still has six digits. Set by:
 `test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
@@ -59,7 +59,7 @@ class NotFiniteError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Actuator(Ordered):
-    """The chain of a hypothesis, over records whose start state may be unknown; the weights are separate arguments."""
+    """The chain of a hypothesis, for records whose start state may be unknown; the weights are separate arguments."""
 
     thresholds: Array
     stages: tuple[Stage, ...]
@@ -67,16 +67,16 @@ class Actuator(Ordered):
     gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
         default_factory=dict, compare=False, repr=False
     )
-    """Gain and offset over a run, kept with effect and run, since the `id` of a deleted object may be reused."""
+    """Gain and offset over a run, stored with effect and run, since the `id` of a deleted object may be reused."""
     starts: Starts = ()
     """Start memories found in the presence of the effects: an item's turns, and the turns that replace them."""
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant added to them.
 
-        They hold only the compared samples if no later part needs the others; `compared` picks these in any case. With
-        `p`, a single row: the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
-        actuators with common effects.
+        The rows hold only the compared samples if no later part needs the others; `compared` picks those in any case.
+        With `p`, a single row: the weighted sum, which passes through the rest of the chain once. `sums`: weighted sums
+        shared by actuators with common effects.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -103,7 +103,8 @@ class Actuator(Ordered):
 
     @cached_property
     def _needed(self) -> int:
-        """The last part of the chain that needs every sample; after it the compared ones are enough."""
+        """The last part of the chain that needs every sample; the compared samples are enough for the parts after
+        it."""
         if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
             return _MAPPED
         if len(self.filters) < len(self.at(Place.LINEAR)):
@@ -177,7 +178,7 @@ class Actuator(Ordered):
         return joint.through_front(course, self.stages)
 
     def _visited(self, item: Item) -> Turns | None:
-        """Drive values that lead virgin plays to the start memory; None for an unknown one."""
+        """Drive values that bring virgin plays to the start memory; None if that is unknown."""
         if item.history is None and item.turns is not None:
             return dict(self.starts).get(item.turns, item.turns)
         return item.visited
@@ -189,11 +190,11 @@ class Actuator(Ordered):
         return course.v, item.run, self.thresholds, start
 
     def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
-        """The best offset (N,) in front of a sensor and behind a limit, and the slope of the output over it (N,).
+        """The best offset (N,) before a sensor and after a limit, and the output's derivative (N,) with respect to it.
 
-        The offset includes the responses to an unknown start state, which a sensor also sees and which move it along
-        its curve, but not drift added behind the sensor. Also returns the contribution of these responses to the output
-        at the compared samples, to first order; their factors are within the limits of `largest`.
+        The offset includes the responses to an unknown start state, which move the sensor along its curve, but not
+        drift added after the sensor. Also returns the contribution of these responses to the output at the compared
+        samples, to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -227,8 +228,8 @@ class Actuator(Ordered):
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
         """(k, N) free components of a record at the compared samples: its offset, and responses to an unknown start.
 
-        A history gives the memory of the plays, but not its timing, on which slow effects depend. `offset`: slope of
-        the output over the offset, if there is a map between them.
+        A history gives the memory of the plays, but not its timing, on which slow effects depend. `offset`: derivative
+        of the output with respect to the offset, if there is a map between them.
         """
         free = self._free(item)[:, item.compared]
         return free if offset is None else free * offset
@@ -253,8 +254,7 @@ class Actuator(Ordered):
     def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
         """Measured minus predicted with the free components fitted; NaN where the record is not compared.
 
-        `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
-        equal terms.
+        `like`: another actuator and its weights, whose `nuisances` replace its own, to compare the two on equal terms.
         """
 
         def make() -> Array:
@@ -277,11 +277,12 @@ class Actuator(Ordered):
 
     @cached_property
     def _numbers(self) -> object:
-        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
+        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # keys may hold lists
         return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
-        """(2, N) at the compared samples: error before free components are fitted, and its slope over the offset."""
+        """(2, N) at the compared samples: error before fitting free components, its derivative with respect to the
+        offset."""
 
         def make() -> Array:
             rows, constant = self.columns(item, p)
@@ -321,7 +322,7 @@ class Part:
     """An effect in a hypothesis: its catalogue name and the candidate whose parameters are fitted.
 
     `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, because its
-    author set it or the effect would be a different one beyond it.
+    author set it or because the effect would be a different one beyond it.
     """
 
     name: str
@@ -385,7 +386,7 @@ class Structure:
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
     def held(self, shape: Array) -> Structure:
-        """The structure without free parameters: front and effects keep those of a shape."""
+        """The structure without free parameters: front and effects keep the values of a shape."""
         front_shape, _ = self.pieces(shape)
         front = Kept(self.front.stages(front_shape), self.front.name)
         return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
@@ -396,7 +397,7 @@ class Structure:
         return Actuator(self.thresholds, stages, tuple(self.effects(shape)), starts=self.starts)
 
     def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
-        """The actuators of a shape with one parameter after another changed by `DIFFERENCE`; `here` shares the rest."""
+        """The actuators of a shape with one parameter at a time changed by `DIFFERENCE`; the rest comes from `here`."""
         front, numbers = self.pieces(shape)
         ends = len(front) + np.cumsum([len(x) for x in numbers])
 
@@ -519,7 +520,7 @@ def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> An
 
 
 def _through(places: Array, nominal: Sequence[float]) -> Array:
-    """The places, the nearest one moved to each nominal threshold, so that a correct nominal model fits exactly."""
+    """The thresholds, the nearest moved to each nominal threshold, so that a correct nominal model fits exactly."""
     moved = places.copy()
     for r in nominal:
         near = int(np.argmin(np.abs(places - r)))

@@ -1,4 +1,4 @@
-"""Parameters at an end of their search range, and the wider range that is tried for them."""
+"""Parameters at an end of their search range, and the wider range tried for them."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from hystgen.identification.joint import DIFFERENCE
 Array = NDArray[np.float64]
 
 BISECTIONS = 4
-"""Bisections of a widening that the schema does not allow in full: they find its limit to a sixteenth of the widening,
-which decides only how far a search may go."""
+"""Bisections of a widening that the schema does not allow in full: they locate the limit to a sixteenth of the
+widening, which affects only how far a search may go."""
 
 LEAST, LARGEST = "least", "largest"
 
 BEYOND, NO_LESS, LIMIT, FIRM, NOISE = "beyond", "no less", "limit", "firm", "noise"
-"""Why a parameter is at an end: a wider range was better; a wider one was not; the schema allows none; the range is not
-widened; only noise is left, so none was tried."""
+"""Why a parameter is at an end: a wider range was better; a wider range was not better; the schema allows none; the
+range is fixed; only noise remains, so none was tried."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class End:
 
 
 def wider(now: Fitted, records: Records) -> Fitted | None:
-    """The hypothesis fitted with wider ranges for parameters at an end of theirs; None if the schema allows none."""
+    """The hypothesis fitted with wider ranges for parameters at an end of theirs; None if the schema allows no wider
+    range."""
     if not _parts_at_an_end(now):
         return None
     numbers, thresholds = now.structure.pieces(now.shape)[1], tuple(now.structure.thresholds.tolist())
@@ -59,7 +60,7 @@ def _parts_at_an_end(now: Fitted) -> list[int]:
 def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
     """The part with its range widened by `acceptance.WIDER` usual widths beyond each end that a parameter has reached.
 
-    It is widened only as far as the schema allows; if that is not at all, the part itself is returned.
+    It is widened only as far as the schema allows; if the schema allows no widening, the part itself is returned.
     """
     if part.firm:
         return part
@@ -75,9 +76,9 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a move `way` of parameter j that changes the effect and that the schema allows.
+    """Largest fraction of a move `way` of parameter j that changes the effect and that the schema allows.
 
-    The schema must allow a little more, for the slope that a search needs.
+    The schema must allow a little more, so that a search can take a difference there.
     """
     here = _made(candidate, numbers, thresholds)
 
@@ -108,8 +109,8 @@ def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -
 
 
 def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]:
-    """The parameters at or beyond an end of their usual range; `leaves`: held-out rms of a wider range that was tried
-    and failed, or None."""
+    """The parameters at or beyond an end of their usual range; `leaves`: held-out rms with a wider range that
+    failed."""
     found = []
     for k in _parts_at_an_end(now):
         part, x = now.structure.parts[k], now.structure.pieces(now.shape)[1][k]

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 SLOPE_PLACES = 201
-"""Number of drives at which the slope of a front is judged."""
+"""Number of drive values at which the slope of a front is evaluated."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Option:
     """One way to extend a hypothesis. `front`: whether it adds a front, which is named after the fit.
 
     `structure`: with all parameters free; `alone`: with only the extension's parameters free, from `starts`. `beyond`:
-    label of the simpler option that it contains and follows; `grown`: a start from that option's parameters.
+    label of the simpler option that this option contains and follows; `grown`: a start from that option's parameters.
     """
 
     label: str
@@ -51,7 +51,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of the whole hypothesis with these parameters for the extension; the others stay."""
+        """The shape of the whole hypothesis with these parameters for the extension; the other parameters stay."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -108,7 +108,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
 
 
 def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -> list[Option]:
-    """The memoryless parts that may be added in front."""
+    """The memoryless parts that can be added in front."""
 
     def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
         pair = replace(structure, front=front), replace(held, front=front)
@@ -119,7 +119,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
     bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # bent one way over the whole range
-    # outside the range, neither a limit nor a small change of it has any effect: start inside
+    # outside the drive range, neither a limit nor a small change to it has any effect: start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -132,9 +132,10 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 
 
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
-    """`LIMIT` for a front that is linear between flatter ends, or bends alike at both; else `BEND`.
+    """`LIMIT` for a front that is linear between flatter ends, or bends in the same way at both ends; else `BEND`.
 
-    Both names if only one end is a little flatter: a soft limit there and a bent actuator give the same front.
+    Returns both names if only one end is slightly flatter: a soft limit at that end and a bent actuator give the same
+    front.
     """
     v = np.linspace(*drive, SLOPE_PLACES)
     w = v
@@ -165,13 +166,13 @@ class Tried:
     option: Option
     fitted: Fitted
     names: tuple[str, ...]
-    """its name, and others that the same front may have"""
+    """its name, and other names that the same front may have"""
     held_out: float
     errors: list[Array]
 
     @property
     def name(self) -> str:
-        """The first of its names."""
+        """The first of the option's names."""
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
@@ -186,7 +187,7 @@ def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
 
 @dataclass(frozen=True)
 class Records:
-    """The records of a search: in full, thinned for searches, and thinner still for the screening.
+    """The records of a search: in full, thinned for searches, and thinned further for the screening.
 
     `full`: fitted records with as many samples as any fit compares; `quick`: with as many as a search compares; `thin`,
     `thin_held`: with as many as the screening compares.
@@ -210,7 +211,7 @@ class Records:
     one_speed: bool
     """whether the fitted records follow their loops in the same time"""
     compared: float
-    """share of the recorded samples that are compared"""
+    """fraction of the recorded samples that are compared"""
 
     @classmethod
     def of(
@@ -240,15 +241,15 @@ class Records:
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
         """A hypothesis, and a copy whose weights are refitted with the free start states of another one.
 
-        Free start states of an effect that is slow compared with the records follow any slow error. Weights that had to
-        follow it alone would do worse than with free states, and the effect would be credited with the difference.
+        Free start states of an effect that is slow compared with the records follow any slow error. Without them, the
+        weights alone would have to follow that error; they would do worse, and the effect would get the credit.
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
         return [now, fits.on_equal_terms(now, other, self.quick)]
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
-        """The hypothesis with one more effect, the best shapes first; `worth`: selects the options to try."""
+        """The hypothesis with one more effect, best shapes first; `worth`: selects the options to try."""
         rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
@@ -304,13 +305,12 @@ class _Screened:
 
     @property
     def numbers(self) -> int:
-        """Number of its parameters."""
+        """Number of the option's parameters."""
         return len(self.option.alone.start)
 
 
 _SCREEN, _JOIN, _POLISH, _RESTART = range(4)
-"""Stages of a search: a few steps for the option alone, a few for the whole hypothesis, the remaining steps, and a new
-search for start memories."""
+"""Stages of a search: first steps for the option alone, then for the whole hypothesis, last steps, start memories."""
 
 
 class _Trial(NamedTuple):
@@ -318,9 +318,9 @@ class _Trial(NamedTuple):
     k: int
     """index of the option"""
     shape: Array | None = None
-    """start of the search; for a shape that contains a simpler one, the parameters of that one"""
+    """start of the search; for a shape that contains a simpler one, the parameters of the simpler one"""
     weights: Array | None = None
-    """weights close to those of the start"""
+    """weights close to the weights at the start"""
     steps: int = 0
     rms: float = math.nan
     """error at the start, if it is known"""
@@ -389,7 +389,7 @@ class _Searches:
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
     def _join(self, option: Option, task: _Trial) -> Fitted:
-        """The whole hypothesis fitted from the start of a task, by its number of steps."""
+        """The whole hypothesis, fitted from a task's start with its number of steps."""
         assert task.shape is not None
         assert task.weights is not None
         search = fits.begun(option.structure, self.records.quick, task.shape, task.weights)
@@ -409,8 +409,8 @@ class _Searches:
 def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
 
-    Failed steps do not end it: each increases the damping of the next, until one is short enough to lower the error. A
-    search that ended there once judged a strongly cubic sensor by its start.
+    Failed steps do not end the search: each increases the damping of the next, until a step is short enough to lower
+    the error. Ending at a failed step once meant judging a strongly cubic sensor by its start.
     """
     for _ in range(acceptance.LONGER):
         before, search = search.now, search.further(steps, fits.COARSE)
@@ -423,7 +423,7 @@ _Pool = parallel.Pool[_Trial, _Numbers]
 
 
 def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
-    """The options after a few steps on thinned records: the best on fitted and on held-out ones.
+    """The options after a few steps on thinned records: the best on fitted and on held-out records.
 
     Effects found before keep their parameters here; they are fitted jointly with the options that are followed up. A
     shape that contains a simpler one is tried if the simpler one helps, and kept if it helps more.
@@ -467,15 +467,14 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
 
 
 def _cost(structure: Structure, option: Option) -> int:
-    """Rough cost of a search: the longest start first, so that the pool does not wait for one at the end."""
+    """Rough cost of a search; the longest search starts first, so that the pool does not wait for it at the end."""
     return len(structure.start) * (1 + len(option.starts))
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
-    """The best options on held-out records, the best of the others on fitted ones, and helpful twins of these.
+    """The best options on held-out records, the best of the others on fitted records, and helpful twins of both.
 
-    If its effect is already kept, a twin must have fewer parameters than the kept shapes; that with the fewest is
-    taken.
+    If its effect is already kept, a twin must have fewer parameters than the kept shapes; the simplest is taken.
     """
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.residual), sorted(tried, key=lambda one: one.fitted.rms)
@@ -495,7 +494,7 @@ def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Scr
 
 
 def _twins(one: _Screened, other: _Screened) -> bool:
-    """Whether two options leave nearly the same errors, fitted and held out."""
+    """Whether two options have nearly the same errors on fitted and on held-out records."""
     both = (one.fitted.rms, other.fitted.rms), (one.residual, other.residual)
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 
@@ -529,7 +528,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     going_on, others = [], []
     for k, numbers in done.items():
         if numbers.residual > hopeful:
-            others += anew(k, numbers)  # with the old start memories the right shape can leave twice the error
+            others += anew(k, numbers)  # with the old start memories, the right shape can have twice the error
         else:
             going_on.append(_Trial(_POLISH, k, *numbers[:2], joint.MOST_STEPS))
     done |= all_of([*going_on, *others])

@@ -1,4 +1,4 @@
-"""Grey-box forward selection: the effects that remove the gap on records not used in the fit.
+"""Grey-box forward selection of effects that remove the gap on records not used in the fit.
 
 Held-out errors decide, and fitted ones must confirm. The thresholds, and the reasons for them, are in `acceptance`.
 """
@@ -32,8 +32,7 @@ from hystgen.identification.quality import correlation_time
 Array = NDArray[np.float64]
 
 EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identified"
-"""The models that may be written: with the effects, the nominal one refitted or as given, and the one from
-`identify`."""
+"""Models that may be written: with the effects, the nominal one refitted or as given, the one from `identify`."""
 
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
@@ -46,7 +45,7 @@ class Merit:
     removed: float
     fitted: float
     remaining: float
-    """share of the held-out rms that is left"""
+    """fraction of the held-out rms that remains"""
     p_value: float
 
     def worth(self, gap: float, records: Records) -> bool:
@@ -63,11 +62,12 @@ class Merit:
 class Refusal:
     """Why an effect that was tried is not named: a value, and the limit that it missed.
 
-    `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left on records of one loop], `given` and
-    `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `grows` [s], `range` [share of
-    the gap left], `forgets` [rms left by hysteresis other than a play sum], `wild` [rms by which the inverse moves the
-    plain model's output], `other`: another shape was chosen.
+    `why`: `one_loop` [remaining fraction of the gap], `little` [rms removed], `chance` [p on held-out records],
+    `unsure` [p on fitted records], `small` [fraction of the gap], `most` [remaining rms], `above` [remaining rms on
+    records of one loop], `given` and `identified` [remaining rms], `few` [fraction of samples], `end` [fraction of the
+    drive range], `grows` [s], `range` [remaining fraction of the gap], `forgets` [remaining rms with hysteresis other
+    than a play sum], `wild` [rms change that the inverse causes in the plain model's output], `other`: another shape
+    was chosen.
     """
 
     why: str
@@ -84,10 +84,10 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
 def judged(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | Refusal:
     """Merit of a tried effect, or why it has none.
 
-    It has none if chance explains the difference, if it removes too little to stand out from the noise, if it hardly
-    shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it is a limit
-    that hardly acts except at the very end of the drive, or if it does not level off within the records. Chance does
-    not halve an error to which nothing was fitted, however few events show the effect.
+    An effect has no merit if chance explains the difference, if it removes too little to stand out from the noise, if
+    it hardly shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it
+    is a limit that acts only at the very end of the drive range, or if it does not level off within the records.
+    However few events show an effect, chance does not halve an error to which nothing was fitted.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -153,7 +153,7 @@ def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bo
 
 
 def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
-    """Whether an effect removes enough on equal terms, whether or not by chance; `least`: as in `merit_of`."""
+    """Whether an effect removes enough on equal terms, chance aside; `least`: as in `merit_of`."""
     return _enough(*_removed(now, best, records), _least(now) if least is None else least, records.noise)
 
 
@@ -168,9 +168,9 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 
 
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
-    """Errors of a hypothesis with the free start states and offset of an effect, which do not count as its merit.
+    """Errors of a hypothesis given the free start states and offset of an effect, which do not count as its merit.
 
-    Its own free start states are used instead if the error is then smaller. `terms`: from `Records.terms`.
+    The hypothesis's own free start states are used instead if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
@@ -188,14 +188,15 @@ def _only_grows(fitted: Fitted) -> Refusal | None:
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     """All candidates tried: first the best and those about as good, ordered by number of parameters.
 
-    A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
-    much better the best one fits (two shapes of one effect each have their own free states, which are part of the
-    effect). Or its held-out error is within a few per cent, and its fitted error is equal, larger by chance or, if a
-    parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of the best is
-    the largest that is tried, all alike candidates are about as good: so much creep can also follow a lag. With equal
-    numbers of parameters, the error over all records decides; if it hardly differs, the held-out error; then `place`: a
-    lag, which every amplifier has, before a delay. A small lead on held-out records, whose error may belong mostly to a
-    third effect, does not make a candidate the best if its fitted error is far larger than another's.
+    A candidate is about as good in two cases. First, its held-out error with the same free start states is no larger,
+    however much better the best one fits (two shapes of one effect each have their own free states, which are part of
+    the effect). Second, its held-out error is within a few per cent, and its fitted error is equal, larger by chance
+    or, if a parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of
+    the best is the largest that is tried, all candidates that are `alike` are about as good: so much creep can also
+    follow a lag. With equal numbers of parameters, the error over all records decides; if these errors are nearly
+    equal, the held-out error decides; then `place`: a lag, which every amplifier has, before a delay. A small lead on
+    held-out records, whose error may belong mostly to a third effect, does not make a candidate the best if its fitted
+    error is far larger than another's.
     """
     if not tried:
         return []
@@ -246,7 +247,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 
 def place(name: str) -> tuple[int, float]:
-    """Order among equal effects, of which the first is named: effects with a rank, then a bent front, since an
+    """Order among equally good effects, the first of which is named: effects with a rank, then a bent front, since an
     asymmetric actuator comes before a nonlinear sensor, then the rest of the catalogue, then the user's own."""
     if name not in effects.CATALOGUE:
         return (1 if name == effects.BEND else 3), 0
@@ -261,7 +262,7 @@ def _at_an_end(fitted: Fitted) -> bool:
 
 
 def _at_most(fitted: Fitted) -> bool:
-    """Whether an amount of the last effect is the largest that is tried."""
+    """Whether an amount of the last effect is the largest one tried."""
     if not fitted.structure.parts:
         return False
     last, numbers = fitted.structure.parts[-1].candidate, fitted.structure.pieces(fitted.shape)[1][-1]
@@ -274,9 +275,9 @@ def _everywhere(each: Tried, best: Tried, records: Records) -> float:
 
 
 def alike(other: Tried, best: Tried, noise: float) -> bool:
-    """Whether the records leave open which of two effects is present.
+    """Whether the records cannot decide which of two effects is present.
 
-    They do unless the advantage of one over the other is enough to deserve a name and is not due to chance.
+    They can decide if the advantage of one over the other is large enough to deserve a name and not due to chance.
     """
     if no_worse(other.held_out, best.held_out, noise):
         return True
@@ -304,7 +305,7 @@ def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records
     others = [each for each in rivals(best, tried, records) if no_worse(each.fitted.rms, least, records.noise)]
     if records.one_loop:
         others += [each for each in tried if each.name != best.name and _explains_most(now, each, records)]
-        if not is_noise(best.held_out, records.noise):  # held-out records do not confirm what fitted ones show
+        if not is_noise(best.held_out, records.noise):  # not confirmed by held-out records
             others += [
                 each
                 for each in tried
@@ -338,14 +339,14 @@ class Explained:
 
     @property
     def left(self) -> float:
-        """Share of the gap above the noise that is left; infinite if there was none."""
+        """Remaining fraction of the gap above the noise; infinite if there was no gap."""
         left, gap = apart(self.after, self.noise), apart(self.before, self.noise)
         return left / gap if gap > 0.0 else 0.0 if left == 0.0 else math.inf
 
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
-    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without them, compared
-    with the same free start states and offsets."""
+    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without the effects,
+    compared with the same free start states and offsets."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -356,10 +357,11 @@ def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, E
 def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     """Why the effects found are withdrawn, or None: together they must explain most of the gap.
 
-    This applies to held-out and to fitted records. Many effects can remove part of a disturbance; the remaining error
-    tells it from a real effect. Records of one loop support no name if more than noise remains; too few compared
-    samples never do. If much remains, no parameter of an effect may be at an end of its range unless nine tenths are
-    explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
+    The criterion applies to held-out and to fitted records. Many effects can remove part of a disturbance; the
+    remaining error distinguishes a disturbance from a real effect. Records of one loop support no name if more than
+    noise remains, and too few compared samples support none at all. If much remains, no parameter of an effect may be
+    at an end of its range unless nine tenths are explained: an effect so strong, slow or fast can follow part of any
+    error, but not nine tenths of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -378,7 +380,7 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
 
 
 def _supported(now: Fitted, best: Tried, records: Records) -> bool:
-    """Whether the records support a name, even if they are of only one loop."""
+    """Whether the records support a name even if they contain only one loop."""
     return not records.one_loop or ((now.bare or bear_two(records)) and _explains_most(now, best, records))
 
 
@@ -388,9 +390,9 @@ def no_worse(residual: float, least: float, noise: float) -> bool:
 
 
 def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """One-sided p-value for squared errors that fall, over blocks longer than the errors are correlated.
+    """One-sided p-value for a fall in squared errors, over blocks longer than their correlation time.
 
-    Wilcoxon's signed-rank test: an effect may show in a few events, so the mean alone is not a good measure.
+    Wilcoxon's signed-rank test is used because an effect may show in only a few events, which dominate a mean.
     """
     from scipy.stats import wilcoxon
 
@@ -415,7 +417,7 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """An effect that was accepted, and the held-out rms before and after it."""
+    """An accepted effect, and the held-out rms without and with it."""
 
     name: str
     label: str
@@ -448,8 +450,8 @@ class Withdrawal:
 class Outcome:
     """The refitted nominal model, the model to be written, its effects, and the ranking of each round.
 
-    `ends`: its parameters at an end of their ranges; `written`: which model is written: `extended` by effects,
-    `refitted`, `given`, or `identified` independently of the nominal one.
+    `ends`: parameters at an end of their ranges; `written`: which model is written: `extended` by effects, `refitted`,
+    `given`, or `identified` independently of the nominal one.
     """
 
     refitted: Fitted
@@ -467,7 +469,7 @@ class Outcome:
 
     @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of an effect that was found and one that it may be instead."""
+        """Pairs of an effect found and an effect that cannot be told apart from it."""
         return tuple((each.name, rival) for each in self.found for rival in each.rivals)
 
 
@@ -513,7 +515,7 @@ def refused(rankings: Sequence[Sequence[Ranked]], why: Refusal) -> tuple[tuple[R
 
 
 def better(one: Fitted, other: Fitted, items: Sequence[Item]) -> bool:
-    """Whether one fit predicts records better than another by enough to count."""
+    """Whether one fit predicts records better than another by a margin that counts."""
     return rms(one.errors(items)) < (1.0 - acceptance.BETTER) * rms(other.errors(items))
 
 
@@ -523,7 +525,8 @@ def again(fitted: Fitted, ready: Prepared) -> Fitted:
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """The outcome with p_0 raised to the floor of `identify`, and the weights; its errors are those of this model."""
+    """The outcome, with the errors of the model with p_0 raised to the floor of `identify`, and that model's
+    weights."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
@@ -540,8 +543,7 @@ def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
 
 
 def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] = lambda _: False) -> Outcome:
-    """Add effects to the refitted model as long as one qualifies; the search also ends with a model that `until`
-    accepts."""
+    """Add effects to the refitted model as long as one qualifies and `until` has not accepted the model."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
@@ -595,7 +597,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
 
 
 def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
-    """The effects fitted to all samples, without any that thereby become needless.
+    """The effects fitted to all samples, without those that become needless in that fit.
 
     Also returns the held-out rms with wider ranges that were tried and failed, or None.
     """
@@ -612,8 +614,7 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
 def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
     """The hypothesis with wider ranges for parameters at an end of theirs, as long as held-out errors fall.
 
-    Also returns the held-out rms with the widest range that was tried and failed, or None. If only noise remains, none
-    is tried.
+    Also returns the held-out rms with the widest range that failed, or None. If only noise remains, none is tried.
     """
     for _ in range(acceptance.WIDENINGS):
         if is_noise(records.residual(now), records.noise):
@@ -661,11 +662,11 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None if there is none to try.
+    """The best extension of a hypothesis and the extensions that were tried; None if there is no extension to try.
 
     `start`: the same hypothesis with other parameters, from which extensions are searched for; `least`: as in
     `merit_of`. An extension may explain most only through its free start states and have no merit on equal terms; then
-    the next one is judged. If another explains far more, but in too few places for certainty, none is named.
+    the next one is judged. If another explains far more, but at too few samples to be certain, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -683,19 +684,20 @@ def _step(
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether only noise is left: no other first effect can do better, and `_exchanged` finds equally good ones."""
+    """Whether only noise remains: no other first effect can do better, and `_exchanged` finds equally good ones."""
     return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
+    """The latest step with a rival instead of its best effect, and the step that follows from it; None to keep the
+    best.
 
-    The next step shows which of several alike effects is present: the accepted one is wrong if nothing more qualifies
-    after it although it does after a rival, or if more error then remains, or the same error takes more parameters. If
-    the next effect is itself a rival, `_exchanged` examines what else fits beside it.
+    The next step shows which of several similar effects is present: the accepted one is wrong if no further effect
+    qualifies after it but one does after a rival, if more error then remains, or if the same error takes more
+    parameters. If the next effect is itself a rival, `_exchanged` examines which other effects fit in addition.
 
-    If nothing more qualifies, the accepted effect may be the right one in a wrong shape: a simpler shape, about as
-    good, absorbs part of the next effect, which then makes held-out errors worse. `_exchanged` finds the right shape
+    If no further effect qualifies, the accepted effect may be the right one with a wrong shape: a simpler shape, about
+    as good, absorbs part of the next effect, which then makes held-out errors worse. `_exchanged` finds the right shape
     only once the next effect is included.
     """
     alike = rivals(latest.best, latest.tried, records)
@@ -728,9 +730,9 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
     """A step to another effect that the accepted one hides, and the step from there to the accepted one, or None.
 
-    An effect with many parameters also follows other effects, as a fast state of creep follows relaxing plays. Next to
-    it, little is left for the other to explain, although it is followed only roughly. The two are tried in the opposite
-    order if the accepted one leaves so much error that a verdict would begin with it.
+    An effect with many parameters also follows other effects, as a fast state of creep follows relaxing plays. Little
+    remains for the other effect to explain, although the first follows it only roughly. The two are tried in the
+    opposite order if so much error remains with the accepted one that a verdict would begin with it.
     """
     left = records.residual(failed.now)
     if left <= acceptance.MUCH_LEFT * records.noise:
@@ -758,8 +760,8 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
     """Two effects that hide each other: neither qualifies alone, but each does next to the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
-    records, and with each that is certain on fitted ones. Alone, the first may even raise the error; it is then
-    credited with none of the gap.
+    records, and with each effect that is certain on fitted records. Without the second effect, the first may even raise
+    the error; it is then credited with none of the gap.
     """
     one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
@@ -792,7 +794,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights from a linear fit without the effects, then with them: a sensor's curve misleads far from its range."""
+    """Weights from a linear fit without, then with the effects: a sensor's curve misleads far from its range."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -803,7 +805,7 @@ def _without_needless(
 ) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
     """Drop earlier effects that later ones have made needless.
 
-    Returns the model, the remaining effects, and for each earlier one the model without it.
+    Returns the model, the remaining effects, and for each earlier effect the model without it.
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
@@ -820,11 +822,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Replace earlier effects by other effects or shapes that do better with the later ones.
+    """Replace earlier effects with other effects or shapes that do better together with the later ones.
 
-    The first of two was chosen while the second was missing, and may have absorbed part of it; the second was then
-    chosen next to a wrong first one. Rivals, too, are judged with all other effects. `less`: the models without one
-    effect, as far as known; `names`: effects among the best of some round, the only ones worth another search.
+    The first of two effects was chosen while the second was missing, and may have absorbed part of it; the second was
+    then chosen next to a wrong first one. Rivals, too, are judged with all other effects present. `less`: the models
+    without one effect, as far as known; `names`: effects to search again, the best of some round.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -856,10 +858,10 @@ def _exchanged(
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
-    """The step with the effect that replaces the named one, or None: its best, or one as good with fewer parameters.
+    """The step with the effect that replaces the named one, or None: its best, or an equal one with fewer parameters.
 
-    The best of a step is chosen by differences of a few per cent, which records near the noise do not support. A shape
-    of the effect itself is preferred to another effect with as many parameters, unless the latter leaves less error.
+    The best of a step is chosen by differences of a few per cent, which records with errors near the noise do not
+    support. A shape of the effect itself is preferred to another effect with as many parameters and no smaller error.
     """
     every = [*records.to_fit, *records.held]
     fitted, found = now, None
@@ -883,9 +885,9 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     error on equal terms, or an equal one with an earlier `place`.
 
     If the other has no more parameters and held-out errors hardly differ, the error over all records decides; between
-    two effects with equally many parameters, the order of `simplest_first`. Of two effects that the records do not
-    separate, the one with fewer parameters stands, since more can follow another effect; of two shapes of one effect,
-    whose name is not in question, the one with the smaller error.
+    two effects with equally many parameters, the order of `simplest_first` decides. Of two effects that the records do
+    not separate, the one with fewer parameters stands, since more parameters can follow another effect; of two shapes
+    of one effect, whose name is not in question, the one with the smaller error stands.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -906,7 +908,7 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 
 
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
+    """The effects with a rival for the latest and another shape of an earlier one, if that is better.
 
     The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: each keeps
     the other in place, so that exchanging only one does not find the pair that belongs together.
@@ -938,7 +940,7 @@ def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Recor
 
 
 def in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
-    """The effects with the errors before and after each of them; empty if one does not lower the error."""
+    """The effects with the errors before and after each; empty if one of them does not lower the error."""
     residuals = [records.residual(now)]
     for each in reversed(found[1:]):
         smaller = without_effect(now, each.name, records)
