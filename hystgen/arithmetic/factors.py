@@ -8,13 +8,13 @@ from fractions import Fraction
 from hystgen.basics.jit import jit
 
 LOW_BITS = 20
-"""Low bits of a number, which are multiplied separately; 31 bits remain, and both products fit into 64."""
+"""Number of low bits that are multiplied separately; the upper part then has 31 bits, and both products fit into 64."""
 
 LARGEST = 2**51
-"""Exclusive bound of numbers to be multiplied: their upper part then has 31 bits, like a mantissa."""
+"""Exclusive bound of numbers to be multiplied: their upper part then has no more bits than a mantissa, 31."""
 
 STATE_BITS = 60
-"""Bits of a state without its sign. Ten are dropped before a product, which takes 50; factors have room for that."""
+"""Bits of a state without its sign. A product takes 50 of them; the shifts of factors allow for the ten dropped."""
 
 GUARD = 3
 """Extra low bits of a state. Without them its rounding errors would add up to the last bit of a signal; with them they
@@ -49,13 +49,13 @@ def factor(x: float | Fraction) -> tuple[int, int]:
 
 
 def error(x: float | Fraction) -> float:
-    """Absolute error of x when it is rounded to a factor."""
+    """Absolute error of rounding x to a factor."""
     mantissa, shift = factor(x)
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 
 
 def lifted(x: float, bits: int) -> int:
-    """By how many bits a scaling of x by 2^bits has to fall short for the result to be a factor."""
+    """Number of bits by which a scaling of x by 2^bits must be reduced so that the result is a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 

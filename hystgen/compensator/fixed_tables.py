@@ -396,7 +396,7 @@ class Builder:
         limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX] = self.drive
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = self.output
         limits[slots.OFFSET] = self.offset
-        far = 2 * max(map(abs, c.input_range))  # acts like any drive beyond the range, and is finite
+        far = 2 * max(map(abs, c.input_range))  # has the effect of any drive beyond the range, and is finite
 
         def code(v: float) -> Fraction:
             return Fraction(min(max(v, -far), far)) / self.drive_lsb
@@ -491,7 +491,7 @@ class Builder:
         return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
     def drive_short(self) -> Fraction:
-        """Larger distance of the first or last drive code from its end of the range, in drive units."""
+        """Larger of the distances of the first and the last drive code from the range's ends, in drive units."""
         (first, last), (low, high) = self.drive, self.cascade.input_range
         return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
 
@@ -560,7 +560,7 @@ def upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, by branch. Raises FormatError if there are too many."""
+    """Drives at the kinks of the memoryless part, for each branch. Raises FormatError if there are too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
         if not ascending and not cascade.branches_differ:

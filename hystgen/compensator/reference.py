@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 
 class Engines(NamedTuple):
-    """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in engine
-    loop and in engine corners, there without and with a memoryless part."""
+    """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in the loop
+    engine and in the corner engine, the latter without and with a memoryless part."""
 
     front: ModuleType
     loop: tuple[Operations, Operations]
@@ -46,7 +46,7 @@ class Engines(NamedTuple):
 
 @functools.cache
 def _engines(fixed: bool) -> Engines:
-    """The engines of floating point, or of fixed point, which are imported only when a model needs them."""
+    """The engines in floating point or in fixed point, imported only when a model needs them."""
     if not fixed:
         corners = (forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)
         return Engines(compensator, step_float.OPERATIONS, corners)
@@ -155,7 +155,7 @@ class Session:
             if problems:
                 raise NotInvertibleError(problems)
         limited = clamp or arithmetic is not None
-        if engine == "corners" and min(cascade.pi.weights) < 0:  # corners need an output that rises with the drive
+        if engine == "corners" and min(cascade.pi.weights) < 0:  # its output must rise with the drive
             engine = "loop"
         self._build = functools.partial(
             tables.build, cascade, arithmetic or "float64", engine, limited, lsb, self.inverse
@@ -169,7 +169,7 @@ class Session:
 
     def init(self) -> None:
         """Return to the start memory."""
-        with jit.plain():  # one pass over the plays is not worth compiling
+        with jit.plain():  # a single pass over the plays is not worth compiling
             self._code.init(self.tables, self.state)
 
     @property
@@ -194,8 +194,8 @@ class Session:
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
-        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for other shapes,
-        TypeError for anything but an array of numbers.
+        Fixed point takes and returns codes. Raises ValueError for numbers that are not codes and for arrays of another
+        shape, TypeError for anything but an array of numbers.
         """
         samples = self._samples(x)
         return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)

@@ -1,4 +1,4 @@
-"""The calls for emission: they turn models into C files in a folder, or report how the files there differ."""
+"""The public calls for emission: they write models as C files into a folder, or report how the files there differ."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def emitted_model(model: Model, options: Options) -> Model:
 def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     """Names and text of the C files of one or several models; options as for `emit`. Nothing is written.
 
-    Raises whatever `emit` raises, and ValueError if two models make files of the same name.
+    Raises the same errors as `emit`, and ValueError if two models make files of the same name.
     """
     models = _models(source)
     check_names(models)

@@ -111,7 +111,7 @@ def folded(
 
 class _Folding:
     """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
-    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several may
+    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several can
     denote the same type here."""
 
     def __init__(
@@ -150,7 +150,7 @@ class _Folding:
                 self._change(caller, body)
 
     def _looks(self, expression: str) -> bool:
-        """Whether an expression only reads: it calls nothing that may change its arguments."""
+        """Whether an expression only reads, calling nothing that could change its arguments."""
         called = [self.functions.get(each) or self._known.get(each) for each in re.findall(r"(\w+)\(", expression)]
         given = [kind for each in called if each for kind in each.parameters]
         return None not in called and all("*" not in kind or kind.startswith("const ") for kind in given)

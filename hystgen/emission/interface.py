@@ -1,4 +1,4 @@
-"""What the files of a model say about it: the banner, the header's macros and calls, and the glossary of the C."""
+"""Descriptions in a model's files: the banner, the header's macros and calls, and the glossary of the C."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 # Banner
 
 PERIODS = (50, 200)
-"""[samples] Periods at which the header states how much a sine loses: a fast one, as long as the fastest sweep with
-stated bounds, and a slow one."""
+"""[samples] Periods of the sines whose loss the header states: a fast one, as long as the fastest sweep with stated
+bounds, and a slow one."""
 
 
 def banner(file: str, what: str, command: str, sha256: str, details: Sequence[str] = ()) -> str:
@@ -124,7 +124,7 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
 
 
 def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
-    """When and how closely a drive is kept at rest."""
+    """A sentence on when a drive is kept at rest, and how closely."""
 
     t = compiled.tables
     if not one.variant.quiet:
@@ -278,7 +278,7 @@ def _timing(one: EmittedModel) -> list[Macro]:
     return [
         *found,
         ("PREVIEW", str(compiled.ahead), ahead),
-        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive, relative to rest"),
+        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest reference-to-drive gain, relative to that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, per second, for which the errors below hold"),
         *one.form.code_sizes(compiled.tables),
     ]
@@ -328,7 +328,7 @@ _FEW = "a few operations, less than a step"
 COSTS = {
     "init": "one pass over the plays",
     "reset": "that of init and of a step",
-    "commit": "a few comparisons: the next step absorbs the drive",
+    "commit": "a few comparisons; the next step absorbs the drive",
     "status": "one load and one store",
     "push": "less than a step",
     "settle": "at most that of two steps",
@@ -468,7 +468,7 @@ WORDS = (
     ("way", _CORNERS, "distance of the input from a turning point"),
     ("reach", _CORNERS,
      "distance of the output from a turning point; a reach_t also holds inputs and drives beyond every code"),
-    ("segment", _CORNERS, "a straight piece of output over input, up to where the next play begins to follow"),
+    ("segment", _CORNERS, "a straight piece of output against input, up to where the next play begins to follow"),
     ("pass", r"\bpass\[",
      "the input at which a move has taken a whole block along: the corner is passed, and forgotten"),
     ("kink", r"\bkink\b", "a point along the move where another play begins to follow"),
@@ -479,7 +479,7 @@ WORDS = (
      "the last returned drive: it enters the memory only when the next call absorbs it, or the drive committed in its "
      "place"),
 )
-"""Each word, a pattern found in texts that use it, and its meaning."""
+"""Each word, a pattern that texts with this word contain, and its meaning."""
 
 
 def overview(text: str) -> str:

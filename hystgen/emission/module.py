@@ -185,7 +185,7 @@ def implementation(one: EmittedModel, code: Code) -> str:
 
 @dataclass(frozen=True)
 class Module:
-    """Everything that the files of a model contain.
+    """The contents of a model's files.
 
     `sha256`: hash of the parameters; `reading`: how the inverse of a model with effects reads the reference, one
     sentence per option; `doubts`: why the inverse may be of little use, in sentences.
@@ -205,7 +205,7 @@ class Module:
 
     @property
     def calls(self) -> Mapping[str, Sequence[str]]:
-        """By operator, the functions that it has in addition to those of every model."""
+        """For each operator, its functions beyond those that every model has."""
         return self.compensator.calls
 
 

@@ -184,7 +184,7 @@ def _end(code: str, begin: int) -> int:
 
 
 def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
-    """Problems of a block: types and functions that are missing, wrong or too many."""
+    """Problems with a block's types and functions: missing, wrong or superfluous ones."""
     own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
     functions = {piece.name for piece in found if "typedef" not in piece.text}
@@ -224,7 +224,8 @@ CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|
 
 
 def _calls(code: str) -> Iterator[tuple[int, str]]:
-    """Places and names of calls: a word in front of a parenthesis, or an expression that is itself in parentheses."""
+    """Positions and names of calls: a word in front of a parenthesis, or an expression that is itself in
+    parentheses."""
     for found in re.finditer(r"(\w+)\s*\(", code):
         yield found.start(), found[1]
     for found in re.finditer(r"\)\s*\(", code):

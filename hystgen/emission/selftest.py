@@ -31,7 +31,7 @@ WIDE = ("set_travel",)
 """Settings with more bits than a code, too many for fixed-point samples."""
 
 SHARE = 0.125
-"""[share of its span] How far the samples change a setting: little enough to keep references within reach."""
+"""[fraction of its span] Amount by which samples change a setting: small enough to keep references within reach."""
 
 
 def _fractions(length: int) -> list[float]:

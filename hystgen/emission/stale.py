@@ -27,7 +27,7 @@ class Difference:
     options: Mapping[str, str]
 
     def sentence(self) -> str:
-        """The file and how it differs."""
+        """A sentence on the file and its differences."""
         return f"{self.path} {', '.join(self.reasons)}"
 
 
@@ -80,7 +80,7 @@ class Orphan:
     reason: str
 
     def sentence(self) -> str:
-        """The file and the reason."""
+        """A sentence on the file and the reason."""
         return f"{self.path} {self.reason}"
 
 

@@ -1,4 +1,5 @@
-"""From plain data to checked parameters: every problem at once, each in one plain sentence and at its position.
+"""Turns plain data into checked parameters; reports every problem at once, each in one plain sentence with its
+position.
 
 The structure is checked first (pydantic's findings, reworded), then how values fit together, in every part with a sound
 structure.
@@ -52,9 +53,9 @@ _PLACES: dict[str, type[BaseModel]] = {
     "in emit": schema.EmitDefaults,
     "in emit.compensation": schema.Compensation,
 }
-"""Where a misplaced key belongs, in words, with the keys of that place."""
+"""The place where a misplaced key belongs, in words, with that place's keys."""
 
-# How a key is written, for messages about missing keys.
+# Examples of how a key is written, for messages about missing keys.
 _WRITTEN = {
     "hystgen": "hystgen: 1",
     "name": "name: stage_x",
@@ -213,7 +214,7 @@ class _Checker:
 
     @staticmethod
     def _written(effect: type[Effect] | None, key: str) -> str:
-        """How a missing key is written."""
+        """An example of how a missing key is written."""
         if effect is None:
             return _WRITTEN.get(key, f"{key}: 0.0")
         examples = effect.model_fields[key].examples

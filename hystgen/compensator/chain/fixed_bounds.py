@@ -51,7 +51,7 @@ class Sizes:
     """Largest magnitudes of the signals behind the plays, in output codes.
 
     Forwards: the sum of the plays, the input of each block (`given`, by part) and of each map of the output (`mapped`),
-    and the output. Backwards: the reference after the inverse of each map, the least and largest input that a curve
+    and the output. Backwards: the reference after the inverse of each map, the smallest and largest input that a curve
     returns for it (`inverted`), the target of the output side, the output asked of each block (`wanted`), and the sum
     asked of the plays.
     """
@@ -190,7 +190,7 @@ class Bounds:
 
     @property
     def _kept(self) -> float:
-        """How far the input of the plays can be from its target while the drive stands still."""
+        """Largest distance of the plays' input from its target while the drive stands still."""
         return 2.0 * float(self.tables.number.dither[0]) if self.tables.quiet and not self.condition else 0.0
 
     @cached_property
@@ -265,7 +265,7 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
-        if self._ahead and self.static.branches_differ:  # the front may settle on either branch
+        if self._ahead and self.static.branches_differ:  # the front can settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for each, size, gain in self._behind(True):
             error = error * each.one.growth + each.there(size, self._signal)
@@ -326,8 +326,8 @@ class Bounds:
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
-        """Error of the inverse's answer, without the part that it undoes; under a `condition` the plays are the same,
-        and the answer is off only by its own rounding."""
+        """Error of the inverse's answer, without the part that the inverse undoes; under a `condition` the plays are
+        the same, and only the answer's own rounding remains."""
         if not self.condition:
             undone = self._moved(way)[1] * float(self.inner.output_lsb)
             return self._arriving_error(way) - self._gain() * undone / self._arriving
@@ -347,7 +347,7 @@ class Bounds:
 
     def _gain(self) -> float:
         """As `_gain_at_once`, for plays that have seen only the drives of their own compensator."""
-        if self.tables.moving.moves == DILATED:  # bounds as at once; held drives may be farther apart
+        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but held drives can be farther apart
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
@@ -397,7 +397,7 @@ class Bounds:
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
-        """Error of the drive's limits because drives are whole codes, for a limited drive and the previous one."""
+        """Error of the drive's limits caused by rounding drives to codes, for a limited drive and the one before it."""
         return upward(max(self.inner.drive_short() / self.inner.drive_lsb, Fraction(2.0 * self.slewed)))
 
     def inverse(self) -> float:

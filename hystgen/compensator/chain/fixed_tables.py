@@ -237,7 +237,7 @@ class _Builder:
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent plays are linear outside
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # linear beyond the range
         return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants

@@ -77,7 +77,7 @@ class System:
 
     @property
     def radius(self) -> float:
-        """Spectral radius: the share of a disturbance that remains from one sample to the next in the long run."""
+        """Spectral radius: the fraction of a disturbance that remains from one sample to the next in the long run."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
 
     def states(self) -> Array:
@@ -164,12 +164,12 @@ class Linear(One):
 
     @property
     def misses(self) -> bool:
-        """Whether the signal that arrives may differ from the one solved for."""
+        """Whether the signal that arrives can differ from the one solved for."""
         return True
 
     @property
     def ringing(self) -> Array:
-        """Frequencies (k,) in rad per sample at which its inverse may ring."""
+        """Frequencies (k,) in rad per sample at which its inverse can ring."""
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
@@ -311,7 +311,7 @@ def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
     elif abs(instance.resting(settled) - 2.0) > SAME:
         yield f"resting({settled:g}) is {instance.resting(settled):g}, but rest(2) is {settled:g}; they must be inverse"
     elif one.rest <= 0.0:
-        yield f"its output at rest is {one.rest:g} times its input; the inverse needs a positive factor"
+        yield f"its output at rest is {one.rest:g} times its input, but the inverse needs a positive factor"
     elif max(one.forward.radius, one.backward.radius) >= 1.0:
         where, radius = max(("its block", one.forward.radius), ("its inverse", one.backward.radius), key=lambda e: e[1])
         yield f"{where} keeps {radius:.6g} of a disturbance from sample to sample, but it has to decay"

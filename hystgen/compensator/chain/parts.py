@@ -39,7 +39,7 @@ MOVES: PlaysPart[Mover, Moves]
 (MOVES,) = (module.MOVES for module in _MODULES if hasattr(module, "MOVES"))
 BENDS: PlaysPart[Bent, Bending]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
-"""The effects that move plays, and that bend them."""
+"""The effects that move plays, and those that bend them."""
 
 MAPS: list[MapPart] = [module.MAPS for module in _MODULES if hasattr(module, "MAPS")]
 """Maps of the output at the very end of the chain."""
@@ -136,7 +136,7 @@ class Parts:
 
     @property
     def leading(self) -> list[Any]:
-        """Effects in front of the plays, whose inverse leads."""
+        """Effects in front of the plays; their inverse leads the drive."""
         return [effect for part in AHEAD for effect in self.blocks[part.name]]
 
     def behind(self, seconds: float) -> list[Any]:

@@ -53,7 +53,7 @@ class SensorPolynomial(_Sensor):
 
     shape: Literal["polynomial"] = Field(default="polynomial", description="a polynomial of the output")
     coefficients: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
-        description="c_2, c_3, .., shares of scale", examples=[[0.01, -0.005]]
+        description="c_2, c_3, .., fractions of scale", examples=[[0.01, -0.005]]
     )
     scale: Positive = Field(description="output at which xi = 1, output units", examples=[50.0])
 
@@ -98,7 +98,7 @@ class SensorCurve(_Sensor):
         description="outputs, rising, output units", examples=[[0.0, 10.0, 20.0]]
     )
     values: Annotated[tuple[Number, ...], Field(min_length=2, max_length=MAX_KNOTS)] = Field(
-        description="what the sensor shows there, rising, output units", examples=[[0.0, 11.0, 20.0]]
+        description="sensor readings at the knots, rising, output units", examples=[[0.0, 11.0, 20.0]]
     )
 
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")

@@ -14,7 +14,7 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""[decades] Starts below the fastest recorded rate: a limit that acts never or always has no gradient to follow."""
+"""[decades] Starts below the fastest recorded rate: a limit that never or always acts gives the search no gradient."""
 
 BESIDE = 10.0
 """[times] A step of the drive is at least this many times faster than the adjacent changes, which are about equal in a
@@ -65,8 +65,8 @@ def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: N
 
     An edge is a change within one sample or two, `BESIDE` times as fast as its neighbours. With `edge` 1/2 it happens
     at the mean time of the change: halfway between two samples or, if an averaging converter shows a sample in between,
-    before the end of that sample by the share of the step that the sample shows. Any other `edge` shifts it by as much
-    as between two samples. A linear filter distinguishes it from a linear edge only by second differences.
+    before the end of that sample by the fraction of the step that the sample shows. Any other `edge` shifts it by as
+    much as between two samples. A linear filter distinguishes it from a linear edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
