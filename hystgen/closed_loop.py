@@ -56,8 +56,7 @@ Array = NDArray[np.float64]
 class LoopPart(Protocol):
     """A part of the loop that has a memory.
 
-    A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
-    out).
+    A controller (error in, demand out), compensator (demand in, drive out) or actuator (drive in, displacement out).
     """
 
     def reset(self) -> None:

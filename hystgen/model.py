@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[fraction of the drive's range] Largest move of the drive for one code of the reference in fixed point; more would be
+"""[fraction of the drive's range] Largest move of the drive for a code of the reference in fixed point; more is
 noise."""
 
 MOST_GAIN = 100.0
@@ -371,8 +371,7 @@ class Model:
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """Time that the output takes to settle close to its final value after a full-range step of the drive, up and
-        down.
+        """Times in which the output settles close to its final value after full-range steps of the drive, up and down.
 
         `within`: the error, as a fraction of the final step of the output. Found by simulating the steps with all
         effects, up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one
@@ -454,8 +453,7 @@ class InverseModel:
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The samples `x` (N,), each non-finite one replaced by the last finite one before it, and a mask of those
-    replaced.
+    """The samples `x` (N,), non-finite ones replaced by the last finite one before, and a mask of those replaced.
 
     Samples before the first finite one become `first` or, if that is None, the first finite one. `name`: what messages
     call `x`.

@@ -130,13 +130,12 @@ def track(
 ) -> Tracking:
     """The tracking error with each compensator if the records' motions were the references.
 
-    The recorded actuator is assumed to respond to a drive as the model does, plus the residual of the record:
-    `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive.
-    `straight line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of
-    `model` without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`.
-    `history` and `rest` come before every record; `skip`: seconds at the start of each record that are not compared.
-    Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for units that do not fit
-    the model's.
+    The recorded actuator is assumed to respond to a drive as the model does, plus the residual of the record: `y =
+    model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive. `straight
+    line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
+    without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
+    `rest` come before every record; `skip`: seconds at the start of each record that are not compared. Raises
+    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")

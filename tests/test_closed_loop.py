@@ -638,7 +638,7 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
             loop.run(reference, duration)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="operator 'both' is neither inverse nor forward"):
         CompiledC(model(NOTE), "both")
-    with pytest.raises(ValueError, match="compiler 'ls' is none of gcc, clang, zig"):
+    with pytest.raises(ValueError, match="compiler 'ls' is not one of gcc, clang, zig"):
         CompiledC(model(NOTE), compiler="ls")
     with monkeypatch.context() as patch:
         patch.setattr(compilers, "find", lambda _: None)

@@ -1046,8 +1046,8 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
     cold = warm.simulate(v, extra={"temperature": np.full(len(v), 20.0)})
     assert np.allclose(cold, CASCADE.simulate(v), atol=1e-12)
     for wrong, said in (
-        ({"t": t[::-1]}, "t has to increase"), ({"t": t[1:]}, "t has to be 2000 finite"),
-        ({"t": t, "extra": {"temperature": [1.0]}}, "temperature has to be 2000"),
+        ({"t": t[::-1]}, "t must increase"), ({"t": t[1:]}, "t must have 2000 finite"),
+        ({"t": t, "extra": {"temperature": [1.0]}}, "temperature must have 2000"),
     ):  # fmt: skip
         with pytest.raises(EffectsError, match=said):
             warm.simulate(v, **wrong)

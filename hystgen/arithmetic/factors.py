@@ -23,8 +23,7 @@ add up to an eighth of it, and a slow state stalls in a dead band of at most 1/1
 From 0 to 8 bits, a mode's error bound in q31 and q15 changes by less than 1e-4, since the factors dominate it."""
 
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
-"""Bits of a mantissa without its sign, and range of shifts: a product drops at least one bit, for rounding, and at most
-62."""
+"""Bits of a mantissa without its sign, and range of shifts: a product drops 1 bit (for rounding) to 62 bits."""
 
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
 """Exclusive bound of factors."""

@@ -1,5 +1,4 @@
-"""Checks of arguments to public calls, models, plants and operators; messages say what is wrong and what to pass
-instead."""
+"""Checks of arguments to public calls, models, plants and operators; messages say what to pass instead."""
 
 from __future__ import annotations
 
@@ -163,7 +162,7 @@ def signal(name: str, value: object) -> NDArray[Any]:
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
-        raise ValueError(f"{name} must have one number per sample, but its rows have different lengths") from None
+        raise ValueError(f"{name} must have one number per sample, not rows of different lengths") from None
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:

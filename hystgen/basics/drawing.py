@@ -59,8 +59,7 @@ BLOCKS = 1000
 """Number of blocks into which a line is divided for thinning; the extremes of each block are kept."""
 
 MOST_POINTS = 4000
-"""Lines that cannot be thinned and have more points become pixels in an SVG; also the maximum number of points in a
-scatter plot."""
+"""Longer lines that cannot be thinned become pixels in an SVG; also the maximum number of points in a scatter plot."""
 
 
 KINDS = (".png", ".svg")

@@ -54,8 +54,7 @@ def _cores() -> int:
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and `tick` is called once for
-    each.
+    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and each item calls `tick`.
 
     An item that fails or kills its worker is rerun in this process, so an exception is raised as in a plain loop.
     """

@@ -14,8 +14,7 @@ PATIENCE = 1.0
 """[s] Time before the bar appears."""
 
 OFTEN = 0.1
-"""[s] Interval between updates of the bar; `tick` draws it, since a thread for the bar would rule out forking
-(`parallel`)."""
+"""[s] Interval between updates of the bar; `tick` draws it, since a thread would rule out forking (`parallel`)."""
 
 
 class Progress:

@@ -2,8 +2,8 @@
 
 Everything is written to a staging folder next to its destination and then renamed. The staging folder is removed when
 the work ends, even with an error; if a process was killed, the next one that writes to the same folder removes the
-leftovers. A lock in the staging folder, which the system releases when the process ends, tells leftovers from a folder
-in use.
+leftovers. A lock in the staging folder, which the system releases with the process, tells leftovers from a folder in
+use.
 """
 
 from __future__ import annotations

@@ -30,8 +30,7 @@ CLOSE, FINE = 0.03, 3e-4
 """[fractions of the error and of the step] Limits on the output's deviation from a straight line between samples."""
 
 GOLDEN = 0.381966011250105
-"""[fraction of an interval] Point compared with the straight line: the middle can be whole periods away from both
-ends."""
+"""[fraction of an interval] Point compared with the straight line: the middle can be whole periods from both ends."""
 
 GRADED = 4.0
 """Largest ratio of an interval to its neighbour: an oscillation that happens to cross zero at the test point of one
@@ -53,8 +52,8 @@ class Settling:
 
     `within`: the tolerated error as a fraction of the output's final step; `error`: the same in output units; `up`,
     `down`: settling times in s after a step to the upper or lower end of the range, 0 if the output settles at once,
-    inf if it takes over `followed` seconds; `because`: the effects that take the time; `left_out`: effects independent
-    of the drive.
+    inf if not within `followed` s; `because`: the effects that take the time; `left_out`: effects independent of the
+    drive.
     """
 
     within: float
@@ -161,8 +160,8 @@ class _Answer:
 
 
 def _left(chain: Chain, begin: float, end: float, within: float, dead: float) -> tuple[Array, Array, float]:
-    """Times (N,) since the step, from its arrival on; the output's distance from its final value; and the size of the
-    final step.
+    """Times (N,) since the step, from its arrival on; the output's distance from its final value; size of the final
+    step.
 
     `dead`: time in s until the step arrives.
 

@@ -83,8 +83,7 @@ class FrontAndPlays(Block):
         return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
     def call(self, verb: str, x: float) -> float:
-        """Solve or absorb, even for `rest` and `resting`: the first move, from the start memory, is like other
-        moves."""
+        """Solve or absorb, even for `rest` and `resting`: the first move from the start memory is like any other."""
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
@@ -169,8 +168,8 @@ class FrontAndPlays(Block):
 
 
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
-    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects to be compensated
-    nevertheless."""
+    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects to include
+    anyway."""
     for part in PARTS:
         if (alone := part.unmeasured) and alone.key not in compensate and part.takes(effect):
             write = f"emit: {{compensation: {{compensate: [{alone.key}]}}}}"

@@ -626,8 +626,8 @@ class FixedCurve:
     """A function of integers as a piecewise polynomial; `error`: largest difference between it and the function.
 
     It interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
-    `corners`: arguments of kinks; `below`: bits of a value below a code; `edge`: how far rounding can take an argument
-    out of the domain.
+    `corners`: arguments of kinks; `below`: bits of a value below a code; `edge`: how far a rounded argument can leave
+    the domain.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
-"""Floating-point form of a model: the constants of its kernels. Those of the corner engine are computed as fractions
-and rounded once."""
+"""Floating-point form of a model: the constants of its kernels; those of the corner engine are fractions rounded
+once."""
 
 from __future__ import annotations
 
@@ -140,8 +140,8 @@ def _start(
     """The memory in which play k holds `states[k]`; `curve`: the operator's; `seen`: range of the plays' input.
 
     A play is entered on the side of its state on which it can begin to follow within the range, since lines from far
-    outside would lose digits. The first play that can begin on neither side belongs to the bottom, with all larger
-    thresholds.
+    outside would lose digits. The first play that can begin on neither side, and all with larger thresholds, belong to
+    the bottom.
     """
     s, dtype = _sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]

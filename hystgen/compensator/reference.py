@@ -204,8 +204,7 @@ class Session:
         return samples(self.tables, arguments.signal("u" if self.inverse else "v", x))
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
-        """Run a sequence of init, reset, step and commit with their arguments. Returns the steps' answers and the
-        status bits."""
+        """Run a sequence of init, reset, step and commit with arguments; returns the steps' answers and status bits."""
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
         with jit.for_samples(self._code.run, x):

@@ -30,8 +30,7 @@ def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, he
 
 
 def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
-    """Remarks on an inverse: how many references were limited or held, and how many drives for other references were
-    limited."""
+    """Remarks on an inverse: numbers of references limited or held, and of drives limited for other references."""
     said = []
     if references:
         lie, were = ("lies", "was") if references == 1 else ("lie", "were")

@@ -107,8 +107,8 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """Possible faults of an inverse: the diagnosis could not separate the stage from its sensor, or the drive may not
-    come to rest."""
+    """Possible faults of an inverse: the diagnosis cannot separate stage and sensor, or the drive may not come to
+    rest."""
     advice = "Record wide and nested loops, or use another sensor, and diagnose again"
     present = {*(effect.name for effect in model.effects), *["asymmetry"] * bool(model.cascade.stages)}
     found = []

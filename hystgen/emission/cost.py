@@ -162,8 +162,7 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
 
 
 def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, whose numbers take `real` each, and of the instance that its operators use in
-    turn."""
+    """Bytes of a self-test's samples, with `real` bytes per number, and of the instance that its operators share."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
     return samples * sample, max(size for _, size in memory.instances)
 

@@ -224,8 +224,7 @@ CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|
 
 
 def _calls(code: str) -> Iterator[tuple[int, str]]:
-    """Positions and names of calls: a word in front of a parenthesis, or an expression that is itself in
-    parentheses."""
+    """Positions and names of calls: a word in front of a parenthesis, or an expression in parentheses."""
     for found in re.finditer(r"(\w+)\s*\(", code):
         yield found.start(), found[1]
     for found in re.finditer(r"\)\s*\(", code):

@@ -85,8 +85,8 @@ def operators(one: EmittedModel) -> list[Operator]:
 
 
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
-    """An argument of a setting, in fixed point before rounding to a code; every third one exceeds the limits, if there
-    are any."""
+    """An argument of a setting, in fixed point before rounding to a code; every third exceeds the limits, if there are
+    any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 

@@ -1,5 +1,4 @@
-"""Emitted files that are out of date or that no model writes, and the commands that bring them up to date or delete
-them."""
+"""Emitted files that are out of date or that no model writes, and the commands that update or delete them."""
 
 from __future__ import annotations
 

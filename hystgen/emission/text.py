@@ -37,8 +37,7 @@ _WAYS = [
         r"(?<=\w\()|(?<=_t\))(?=[\w(-])|(?<=\w) (?=[\w*])",
     )
 ]
-"""Positions at which a line can be broken, best ones first: after commas, before ? and :, after operators, the loosest
-binding first."""
+"""Positions at which a line can be broken, best first: after commas, before ? and :, after operators, loosest first."""
 _CHOICE = ("? ", ": ")
 """Beginnings of lines whose continuation is indented further."""
 _GOOD = 7

@@ -1,5 +1,4 @@
-"""Turns plain data into checked parameters; reports every problem at once, each in one plain sentence with its
-position.
+"""Turns plain data into checked parameters; reports every problem at once, in one plain sentence with its position.
 
 The structure is checked first (pydantic's findings, reworded), then how values fit together, in every part with a sound
 structure.

@@ -28,8 +28,7 @@ from hystgen.effects import Unmeasured
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-"""Maximum numbers of stages, of effects, and of characters in a description: more than any model needs, but checks stay
-fast."""
+"""Maximum numbers of stages, effects and characters of a description: more than any model needs, but quick to check."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 

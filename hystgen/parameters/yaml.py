@@ -32,8 +32,7 @@ from hystgen.basics.problems import Path, Problem, path_text, printable
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 16
 MAX_VALUES = 100_000
-"""Limits on a file, so that anything other than a parameter file is refused at once. A file with 4096 plays has 8200
-values."""
+"""Limits on a file: anything other than a parameter file is refused at once. A file with 4096 plays has 8200 values."""
 
 _CONSTANTS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),

@@ -19,7 +19,7 @@ typedef struct {
     bool ascending;       /* direction of the drive's last move */
     unsigned int status;
 #ifdef HYSTGEN_FIXED
-    hystgen_kink_t kink; /* of the present step; stored here rather than on the stack */
+    hystgen_kink_t kink; /* of the present step; kept here rather than on the stack */
 #endif
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_forward_t;
@@ -48,7 +48,7 @@ typedef struct {
     bool committed; /* a drive was committed since */
 #endif
     bool repeated; /* the last returned drive is still valid for `reference` */
-    bool limited;  /* no drive reaches `reference`; stored here rather than on the stack */
+    bool limited;  /* no drive reaches `reference`; kept here rather than on the stack */
 #ifdef HYSTGEN_FIXED
     uint_least8_t bits; /* status of the last returned drive */
 #else
@@ -57,7 +57,7 @@ typedef struct {
     unsigned int status;
 #ifdef HYSTGEN_FIXED
     hystgen_place_t undo; /* position of the plays before the last step */
-    hystgen_kink_t kink;  /* of the present step; stored here rather than on the stack */
+    hystgen_kink_t kink;  /* of the present step; kept here rather than on the stack */
 #endif
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
@@ -74,7 +74,7 @@ typedef struct {
     uint_least8_t bits;       /* status of the last returned drive */
     unsigned int status;
     hystgen_place_t undo; /* position of the plays before the last step, if not a usual one */
-    hystgen_kink_t kink;  /* of the present step; stored here rather than on the stack */
+    hystgen_kink_t kink;  /* of the present step; kept here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
 #else

@@ -13,8 +13,7 @@ OWN = {
     "dilated": "", "dashpot": "", "polynomial": "", "centre": "",
 }
 """Parts of the code that belong to no block, and the operator if only one has the part. `dilated`: for all plays whose
-input is found by a search; `braked`: for a block combined with a slew limit; `quiet`: for a drive that stands still at
-rest."""
+input is found by a search; `braked`: for a block and a slew limit; `quiet`: for a drive that stands still at rest."""
 
 PARTS = ("any", *(each for part in parts.PARTS for each in part.code), *OWN)
 """All parts of the code: `any` (`any_corners` with the corner engine) once per model with effects, every other part

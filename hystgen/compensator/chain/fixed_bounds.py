@@ -149,8 +149,8 @@ class Bounds:
         return ahead_of(self.formats)
 
     def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
-        """Blocks behind the plays in the `forward` operator or in the inverse, each with its largest input and its
-        gain, if any."""
+        """Blocks behind the plays in the `forward` operator or the inverse, with their largest inputs and gains, if
+        any."""
         parts = [part.name for part in BEHIND if forward or not part.forward]
         speed = Speed(self.static.input_range, self.largest_step, self.seconds)
         lsb = float(self.inner.output_lsb)
@@ -166,8 +166,7 @@ class Bounds:
         return found
 
     def _mapped(self) -> MapErrors:
-        """Maps of the output: the slope of their inverse at its ends, and the errors of inverse and maps, in output
-        codes."""
+        """Maps of the output: slope of their inverse at its ends, and errors of inverse and maps, in output codes."""
         found = MapErrors(np.array(self.ends) - self.static.output_offset, 1.0, 0.0, 0.0)
         unit = Whole(self._signal, float(self.inner.output_lsb), self.sizes.output)
         for each, curves in zip(reversed(self.parts.maps), reversed(self.bends), strict=True):
@@ -208,8 +207,7 @@ class Bounds:
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
     def _moved(self, way: float) -> tuple[float, float]:
-        """Error of the sum of plays that an effect moves or bends, in codes, and the part of it that the inverse
-        undoes.
+        """Error, in codes, of the sum of plays that an effect moves or bends, and the part that the inverse undoes.
 
         Its causes are rounding, and contacts within a step in which the plays' input moves by `way`.
         """
@@ -253,8 +251,8 @@ class Bounds:
         return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
-        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way`: by
-        default `_way`."""
+        """Error of the plays' sum, in output codes, for an error in front of the memoryless part; `way`: default
+        `_way`."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         moved, _ = self._moved(self._way if way is None else way)

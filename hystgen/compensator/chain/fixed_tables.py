@@ -377,8 +377,7 @@ class _Builder:
     def _finest(self) -> int:
         """Additional bits in front of the plays that keep rounding, amplified by the lags' lead, below half a code.
 
-        0 for models with a memoryless part or effects on plays, and if the plays' input already has bits below a drive
-        code.
+        0 for models with a memoryless part or effects on plays, or if the plays' input has bits below a drive code.
         """
         if self.static.stages or self.parts.plays or self.inner.fine:
             return 0

@@ -49,8 +49,7 @@ takes two samples to fall and rise again."""
 
 MOST_TIMES = 4
 """[averages] Maximum number in series. One loses least if the gain is to be halved, two if it is to fall to a
-twentieth, three if also a lag and a mode are led together; five are never best. Set by: benchmarks/chosen_numbers.py
-averages."""
+twentieth, three if a lag and a mode are led; five are never best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
 @dataclass(frozen=True)
@@ -243,8 +242,8 @@ def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> S
 
 
 def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
-    """The averages with the least variance that meet the limit with `room` additional weights; if none do, those with
-    the least gain."""
+    """The averages of least variance that meet the limit with `room` additional weights; failing that, of least
+    gain."""
     holding, failing = [], []
     for times in range(1, MOST_TIMES + 1):
         one, most = narrowest(gain, limit, times, max(room // times - 1.0, 1.0), centred)

@@ -84,8 +84,7 @@ def parts_with(
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by part of the chain, each list in the order of the chain; `blocks`: by the part's
-    name."""
+    """The effects of a model by part of the chain, each list in the chain's order; `blocks`: by name of the part."""
 
     blocks: dict[str, list[Any]]
     maps: list[Map]

@@ -1,8 +1,8 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
 A delay is compensated by linear interpolation between two samples; a mode by three samples, or by a shaper or a notch
-for steps from point to point. In series they are one row of weights, which sum to 1; without recursion they are stable
-for any parameters.
+for steps from point to point. In series they are one row of weights, which sum to 1; without recursion they are always
+stable.
 """
 
 from __future__ import annotations

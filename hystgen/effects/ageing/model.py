@@ -88,7 +88,7 @@ class ExponentialAgeing(_Ageing):
 
 
 class SeveralAgeing(_Ageing):
-    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that level off at different distances, as wear at several
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that level off at different distances, like wear at several
     speeds.
 
     Two losses can follow laws between the exponential and the logarithmic one, which spreads over decades of travel.

@@ -20,9 +20,9 @@ FASTEST = 0.01
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
 """[fractions of the play sum, per decade and per state] Largest to try: stages creep by 1 to 2 % per decade, some by up
-to three times that; if there are few states, each represents up to three decades. Set by: 16 blind plants with creep
-(`make blind FIRST=97000`): with half the first, the creep of one plant is not named and two are 3 and 7 % worse; with
-half the second, one is 5 % worse; doubling either changes none by 2 %."""
+to three times that; with few states, each represents up to three decades. Set by: 16 blind plants with creep (`make
+blind FIRST=97000`): with half the first, the creep of one plant is not named and two are 3 and 7 % worse; with half the
+second, one is 5 % worse; doubling either changes none by 2 %."""
 
 SHORTER = 1.0
 """[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
@@ -46,7 +46,7 @@ def creep(
     """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
     `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): initial states of the
-    filters. Several columns, or all filters of one column, run in parallel, since a single recursion would stall on its
+    filters. Several columns, or all filters of one, run in parallel, since a single recursion would stall on its
     previous sample.
     """
     taus, rows = states.shape
@@ -219,8 +219,7 @@ class LogarithmicCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The fraction per decade, with a spectrum over the whole recorded time; then, if that helps, with free
-        ends."""
+        """The fraction per decade over the whole recorded time; then, if that helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays absorb

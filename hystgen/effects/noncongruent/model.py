@@ -25,8 +25,7 @@ from hystgen.effects.base import (
 )
 
 MAX_TERMS = 8
-"""Maximum number of coefficients per play: records determine two (`CUBIC`), and powers beyond the ninth hardly
-differ."""
+"""Maximum number of coefficients per play: records determine two (`CUBIC`); powers beyond the ninth hardly differ."""
 
 CUBIC = "noncongruent, cubic"
 

@@ -191,8 +191,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
 def relaxed(
     x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
 ) -> float:
-    """State of a play that follows its input viscously, after the input has moved from `x` to `target` in the time
-    `left`.
+    """State of a viscously following play after its input has moved from `x` to `target` in the time `left`.
 
     `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
     """

@@ -72,8 +72,7 @@ class TanhSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to a thousand times that range; then also the centre, within the
-        output."""
+        """The level, from a tenth to a thousand times the output range; then also the centre, within the output."""
         low, high = about.drive
         bottom = about.output_range * low / (high - low)  # for plays without hysteresis
 

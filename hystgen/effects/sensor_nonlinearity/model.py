@@ -122,8 +122,8 @@ class SensorCurve(_Sensor):
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array]:
-        """The knots, and coefficients (4, pieces + 2), including both end pieces, of powers of the distance from the
-        knot below."""
+        """The knots, and coefficients (4, pieces + 2) of powers of the distance from the knot below; with both end
+        pieces."""
         x, y = np.array(self.knots), np.array(self.values)
         steps, slopes = np.diff(x), np.diff(y) / np.diff(x)
         at = np.concatenate([slopes[:1], 2.0 / (1.0 / slopes[:-1] + 1.0 / slopes[1:]), slopes[-1:]])

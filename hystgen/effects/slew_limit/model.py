@@ -134,8 +134,7 @@ class _SlewLimit(Effect):
 
     @classmethod
     def _candidate(cls, label: str, n: int, about: About, anywhere: bool = False, **more: Any) -> Candidate:
-        """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the position of
-        edges."""
+        """One rate, or one per direction, up to the fastest recorded one; `anywhere`: also the position of edges."""
         fastest = np.log10(max(about.fastest, 1e-12))
         shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
 
@@ -209,7 +208,7 @@ class SuddenSlewLimit(_SlewLimit):
         return self._averaged(a, then, run.t, times, drive) if self.edge == MIDDLE and n > len(a) else then
 
     def _averaged(self, a: Array, then: Array, t: Array, times: Array, drive: Array) -> Array:
-        """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: its value at the
+        """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: value at the
         sample.
 
         Where the drive steps or is linear, a sample `a` is its mean, and the mean distance is added. Where it bends,

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 14b05417ade167a2d4968dba7eb801cd1cd65ff33d69e0d0d2c6669904eb7dfb, without this line
+ * Text: sha256 e201b7afcfec7cbc8f3176d7cc0c99d0bbe77e8e9f63557c8d15f5361a949476, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -18,10 +18,10 @@
 */
 
 /* Products are rounded before they are added, whatever the compiler's default. clang and others
-   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
-   casts and inline functions alike: only a volatile object or a call for each product would keep
-   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
-   on targets with a fused instruction. */
+   obey the C99 pragma. gcc ignores it and fuses products and sums even across statements,
+   assignments, casts and inline functions; only a volatile object or a call for each product would
+   keep the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used
+   only on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -57,7 +57,7 @@ typedef struct {
     uint_least16_t n;
 } bent_dead_zone_t;
 
-/* Output of a dead-zone sum at x; bisects for the straight piece. */
+/* Output of a dead-zone sum at x; finds the straight piece by bisection. */
 static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -72,7 +72,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Input of a dead-zone sum at its output y; bisects for the straight piece. */
+/* Input of a dead-zone sum for its output y; finds the straight piece by bisection. */
 static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;

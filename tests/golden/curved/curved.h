@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 d1ad733c9bb0db9aca8b4ae686f9ca88b78cb19652040e2b20545d3cc6e4fbd1, without this line
+ * Text: sha256 fa12ed861b96797735f09be907ab018bbabaf5ef62a49cfafa8dde6016ae96ff, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -119,7 +119,7 @@ typedef struct {
     bool limited;            /* no drive reaches `reference`; kept here rather than on the stack */
     uint_least8_t bits;      /* status of the last returned drive */
     unsigned int status;
-    curved_place_t undo; /* place of the plays before the last step */
+    curved_place_t undo; /* position of the plays before the last step */
     curved_kink_t kink;  /* of the present step; kept here rather than on the stack */
     curved_corner_t corner[6];
 } curved_inverse_t;
