@@ -268,7 +268,7 @@ def _block(part: object, sample_time: float, what: str) -> LoopPart:
         return part
     if callable(part) and not isinstance(part, type):
         return _Function(part)
-    raise TypeError(f"{what} is not a part that a loop can have: {part!r}")
+    raise TypeError(f"{what} cannot be a part of a loop: {part!r}")
 
 
 class _Function:
@@ -328,7 +328,7 @@ class _Operator:
 
 
 class _InUnits:
-    """An operator in its arithmetic's number format between two converters: physical units in and out.
+    """An operator between two converters: physical units in and out, numbers of its arithmetic inside.
 
     A fixed-point operator gets the nearest code, ties away from zero, limited to the type; a NaN repeats the last code.
     """

@@ -591,7 +591,7 @@ TWICE = Bang()
         ({"controller": signal.dlti([1.0], [1.0, 0.5], dt=0.2)}, ValueError, "the controller has a sample time of 0.2"),
         ({"controller": None}, TypeError, "a loop needs a controller"),
         ({"controller": signal.lti([1.0], [1.0, 0.0])}, TypeError, "the controller is a continuous system"),
-        ({"compensator": "inverse"}, TypeError, "the compensator is not a part that a loop can have"),
+        ({"compensator": "inverse"}, TypeError, "the compensator cannot be a part of a loop"),
         ({"hysteresis": PI}, TypeError, "the hysteresis is not a part"),
     ],
 )

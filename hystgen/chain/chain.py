@@ -107,7 +107,7 @@ rounding makes evenly spaced times, and thus the lag's factors, differ. Set by: 
 
 
 def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """How far the signal in front of the memoryless part may move back before the branch changes, in drive units."""
+    """Largest move back of the signal in front of the memoryless part that keeps the branch, in drive units."""
     if not static.branches_differ or not any(effect.place is Place.DRIVE for effect in effects):
         return 0.0
     largest = max(abs(end) for end in static.input_range)

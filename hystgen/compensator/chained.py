@@ -91,8 +91,8 @@ class FrontAndPlays(Block):
         go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
 
         A lag falls short by `theta` of the distance to the other branch. With this fraction as the limit, holding never
-        misses by more than an immediate turn would; with any other share the miss can reach at least `1 + theta` times
-        that of a drive that knows how far the reference will go back. `rises`: whether the drive is about to rise.
+        misses by more than an immediate turn would; with any other fraction the miss can reach at least `1 + theta`
+        times that of a drive that knows how far the reference will go back. `rises`: whether the drive will rise.
         """
         w = self._input(y)
         if not self.static.branches_differ:

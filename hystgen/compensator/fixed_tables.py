@@ -151,7 +151,7 @@ def decimal(x: float) -> Fraction:
 class Builder:
     """The steps of `build`, each of which uses the results of those before it.
 
-    `given`: which LSBs the user set; `beyond`: how far beyond its range the input of the plays may be requested, in
+    `given`: which LSBs the user set; `beyond`: how far beyond its range the input of the plays can be requested, in
     spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as behind a lag; `bent`:
     the most that an effect adds to a play's contribution, in units of the play's input.
     """
@@ -461,7 +461,7 @@ class Builder:
     def _play_errors(self) -> list[Fraction]:
         """Largest error of each play against the exact model, in physical units of w.
 
-        Plays that never move are held at their mean; in the exact model such a play may move by `span - r`.
+        Plays that never move are held at their mean; in the exact model such a play can move by `span - r`.
         """
         pi = self.cascade.pi
         front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))

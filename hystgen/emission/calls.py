@@ -126,7 +126,7 @@ def doubts(model: Model) -> list[str]:
 
 
 def _swing(model: Model) -> float:
-    """How far the drive of a model with effects may swing at rest, in drive units."""
+    """Amplitude by which the drive of a model with effects can swing at rest, in drive units."""
     from hystgen.compensator.chain.bounds import swing
     from hystgen.compensator.chain.parts import Parts
 

@@ -169,15 +169,15 @@ def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout)
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to those
-    of a search that bisects its whole list.
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to a
+    search that bisects its whole list.
 
     `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
     engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
     n, where engine `fast` is corners without a front; `both`: the same for corners that are solved and then follow an
-    applied drive that may differ; `solved`: multiplications per play of an inverse in engine loop; `chained`: of
-    an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind
-    a slew limit, and per halving of its search.
+    applied drive that may differ; `solved`: multiplications per play of an inverse in the loop engine; `chained`: of an
+    inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind a
+    slew limit, and per halving of its search.
     """
 
     factor: int
@@ -285,7 +285,7 @@ def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
 
 
 def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
-    """Operations of the plays of a model with effects in engine loop: multiplications, further ones per play,
+    """Operations of the plays of a model with effects in the loop engine: multiplications, further ones per play,
     comparisons, further ones per play, and tanh per play.
 
     Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, and each try

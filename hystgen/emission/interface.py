@@ -133,7 +133,7 @@ def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
     kept = float(t.number.dither[0]) / 2.0 ** one.form.drive_bits(t)
     return [
         f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
-        "the drive that is needed at rest; the input of the plays is then within twice that of its target"
+        "the drive that is needed at rest; the input of the plays is then at most twice as far from its target"
     ]
 
 

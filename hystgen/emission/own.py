@@ -100,7 +100,7 @@ EVERYWHERE = (
 
 IN_CODE = (
     (r"<:|:>|<%|%>|%:", "{0}, a digraph; write the character that it stands for"),
-    (r"#", f"a preprocessor line; only {INCLUDE} is allowed, before anything else"),
+    (r"#", f"a preprocessor line; only {INCLUDE} is allowed, at the top of the file"),
     (r"//", "a comment with //; write /* */"),
     (r"[\"']", "a string or a character; a block needs none"),
     (r"[$@`]", "{0} is not a character of C; leave it out"),
@@ -207,7 +207,7 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
         for place, called in _calls(code):
             if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
                 line = text.count("\n", 0, at + place) + 1
-                yield line, f"{called} is called but not in the file; a block calls only its own functions"
+                yield line, f"{called} is called but not defined in the file; a block calls only its own functions"
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
             for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:

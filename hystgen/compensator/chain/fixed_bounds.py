@@ -304,7 +304,7 @@ class Bounds:
         """Rounding of the plays' input as solved for, in units of signals.
 
         If signals have bits below that input, the remainder of the sum is divided by the slope of the plays that follow
-        up to the input. More plays may begin to follow within the next step of the input: the slope used is then too
+        up to the input. More plays can begin to follow within the next step of the input: the slope used is then too
         small, by a factor down to `p_0/sum p`, and any result beyond that step is cut off.
         """
         t, step = self.tables.moving, float(self.inner.step)

@@ -249,7 +249,7 @@ class _Builder:
 
     def _moving(self, plays: FixedTables) -> FixedMovingTables:
         step = float(self.inner.step)
-        farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still return the input beyond it
+        farthest = min(self._farthest, TABLE_MAX)  # for a search, which can still return the input beyond it
         return moving.build_fixed(
             plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
@@ -305,7 +305,7 @@ class _Builder:
         return min(max_rate * self.seconds + float(self.drive_lsb) * bool(self.parts.slew), high - low)
 
     def slew(self, span: int) -> list[int]:
-        """Whole drive codes by which the drive may rise and fall in one step, then their fractions."""
+        """Largest rise and fall of the drive in one step: whole drive codes, then their fractions."""
         if not self.parts.slew:
             return [0, 0, 0, 0]
         if self._slewed > MOST_SLEWED:

@@ -33,7 +33,7 @@ class ChainNumbers(Struct):
     """Constants of a chain besides those of its plays and blocks."""
 
     output_offset: Real
-    farthest_offset: Real  # largest offset that may be set in addition
+    farthest_offset: Real  # largest offset that can be set in addition
     slew_rising: Real  # largest rise of the drive in a step, and below it largest fall
     slew_falling: Real
     slew_rising_rest: Real  # remainders that rounding removed from these two numbers
@@ -64,7 +64,7 @@ REST_BITS = 30
 
 MOST_SLEWED = 16.0
 """[last bits of the range's end] Maximum rounding accumulated while a slew-limited drive crosses its range; slower
-rates are refused. Derived: bounds of float32 are some 100 last bits, a tenth of which the rate may use."""
+rates are refused. Derived: bounds of float32 are some 100 last bits; a tenth of that is allowed for the rate."""
 
 VERIFIED_SHARE = 0.125
 """Fraction by which verification corrects: exact in every arithmetic."""
@@ -298,7 +298,7 @@ def braked(parts: Parts, ones: Mapping[str, Sequence[Any]]) -> int:
 
 
 def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
-    """How far the drive may rise and fall in a step, in drive units; empty without a slew limit."""
+    """Largest rise and fall of the drive in a step, in drive units; empty without a slew limit."""
     if not parts.slew:
         return ()
     pairs = [(each.rate, each.falling_rate) for each in parts.slew]
@@ -331,8 +331,8 @@ def hold(rounded: N, dither: N, turning: bool) -> N:
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE in drive units per second: as requested, else a slow sweep; at most the rate of the amplifier, and
-    the rate at which own heat keeps the gain within its limits.
+    """NAME_MAX_RATE in drive units per second: as requested, else that of a slow sweep; at most the amplifier's rate,
+    and the rate up to which own heat keeps the gain within its limits.
 
     Above the slew rate the actual drive differs from the one given to the C, depending on when in a step it is reached.
     """

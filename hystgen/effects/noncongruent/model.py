@@ -106,7 +106,7 @@ class PlayFunctions(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The same parabola for all plays; with a cubic term, which may change evenly over r; with a quartic one."""
+        """The same parabola for all plays; then a cubic term, which may vary linearly over r; then a quartic one."""
         plays = len(about.thresholds) - 1
         if plays < 1:
             return []

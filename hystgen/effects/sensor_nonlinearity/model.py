@@ -13,7 +13,7 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas at which a search starts, 10 % at the end of the range: from a linear sensor the search may overshoot."""
+"""Parabolas from which a search starts, 10 % at the end of the range: from a linear sensor it could overshoot."""
 
 PIECES = (6, 12)
 """Numbers of pieces of the monotone curves that are tried if a cubic helps. For a square root over the range, the
