@@ -371,7 +371,7 @@ class Model:
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """Times in which the output settles close to its final value after full-range steps of the drive, up and down.
+        """Settling times of the output after full-range steps of the drive, up and down.
 
         `within`: the error, as a fraction of the final step of the output. Found by simulating the steps with all
         effects, up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one

@@ -83,7 +83,7 @@ def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P
 
 
 def path(name: str, value: object) -> str:
-    """A path as text. Raises TypeError."""
+    """The value as a path in text form. Raises TypeError."""
     if isinstance(value, str | os.PathLike):
         found = os.fspath(value)
         if isinstance(found, str):
@@ -98,7 +98,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> None:
 
 
 def words(name: str, value: object, example: str) -> tuple[str, ...]:
-    """A list of words. Raises TypeError; a single word is not a list."""
+    """The value as a tuple of words. Raises TypeError, even for a single word."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
         found = tuple(value)
         if all(isinstance(word, str) for word in found):
@@ -107,14 +107,14 @@ def words(name: str, value: object, example: str) -> tuple[str, ...]:
 
 
 def real(name: str, value: object, unit: str) -> float:
-    """A real number of any value, infinities and NaN included. Raises TypeError."""
+    """The value as a real number, possibly infinite or NaN. Raises TypeError."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise TypeError(f"{name} must be a number ({unit}), not {kind(value)}")
     return float(value)
 
 
 def number(name: str, value: object, unit: str, least: float = -math.inf) -> float:
-    """A finite number, at least `least`. Raises TypeError and ValueError."""
+    """The value as a finite number of at least `least`. Raises TypeError and ValueError."""
     found = real(name, value, unit)
     if not (math.isfinite(found) and found >= least):
         raise ValueError(f"{name} must be a finite{' nonnegative' * (least == 0)} number ({unit}), not {found:g}")
@@ -122,7 +122,7 @@ def number(name: str, value: object, unit: str, least: float = -math.inf) -> flo
 
 
 def whole(name: str, value: object, unit: str, least: int) -> int:
-    """An integer, at least `least`. Raises TypeError and ValueError."""
+    """The value as an integer of at least `least`. Raises TypeError and ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} must be a whole number of {unit}, not {kind(value)}")
     if value < least:
@@ -131,7 +131,7 @@ def whole(name: str, value: object, unit: str, least: int) -> int:
 
 
 def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
-    """A list of finite numbers. Raises TypeError and ValueError."""
+    """The value as a tuple of finite numbers. Raises TypeError and ValueError."""
     hint = f"give a list of numbers such as {example}"
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise TypeError(f"{name} must be a list of finite numbers, not {kind(value)}; {hint}")
@@ -145,7 +145,7 @@ def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
 
 
 def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[str, str]:
-    """A mapping from some of `keys` to text. Raises TypeError and ValueError."""
+    """The value as a mapping from some of `keys` to text. Raises TypeError and ValueError."""
     if not isinstance(value, Mapping):
         raise TypeError(f"{name} must be a mapping of text to text, not {kind(value)}; give {example}")
     strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]

@@ -87,7 +87,8 @@ class Commands(click.Group):
                 sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; an OSError that it does not catch, and that names no file, comes from its output."""
+        """Run the command; an OSError that it does not catch and that names no file is taken to come from its
+        output."""
         with _output():
             return super().invoke(ctx)
 

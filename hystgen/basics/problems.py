@@ -14,7 +14,7 @@ SHOWN = 60
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with a file.
+    """A problem in a file.
 
     `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong and, after a
     semicolon, what to do; `line` and `column` count from 1, and are None for a problem without a position.

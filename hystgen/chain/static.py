@@ -89,7 +89,7 @@ class StaticModel:
 
     @property
     def stage_spans(self) -> list[tuple[float, float]]:
-        """The input range of every stage, over both branches of those before it."""
+        """The input range of every stage, over both branches of the stages before it."""
         both = zip(self.stage_ranges(True), self.stage_ranges(False), strict=True)
         return [(min(a[0], b[0]), max(a[1], b[1])) for a, b in both]
 

@@ -1,7 +1,8 @@
 """The inverse of a model with effects for a known reference, in double precision and for any sample times.
 
-The compensator keeps only the actuator's states. In each sample it solves for the drive block by block, from the output
-backwards, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
+The compensator's only memory is the states of the actuator. In each sample it solves for the drive block by block, from
+the output backwards, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of
+time.
 
 The reference is read as in the C, with the same weights for its samples, at the record's sample times. Only `quiet` and
 `max_rate` are ignored, since double precision has no codes between which a drive could dither.
@@ -87,8 +88,9 @@ class FrontAndPlays(Block):
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
-        """The drive on the branch of its own move. It stays on its branch while it moves on or holds, and turns only to
-        go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
+        """The drive for output `y`, on the branch of its own move. It stays on its branch while it moves on or holds,
+        and turns only to go back by more than rounding, or by more than a lag in front misses in the first sample of
+        the turn.
 
         A lag falls short by `theta` of the distance to the other branch. With this fraction as the limit, holding never
         misses by more than an immediate turn would; with any other fraction the miss can reach at least `1 + theta`

@@ -382,7 +382,7 @@ class Builder:
         self.bits, self.slope, self.weight, self.lift, self.bound, self.held = bits, slope, weight, lift, bound, held
         self.offset = nearest(offset * 2**bits)
         if min(weight) < 0 or (self.invertible and slope[1] < 16):
-            message = f"{pi.weights[0]:g} rounds to nothing beside the others in {self.arithmetic}"
+            message = f"{pi.weights[0]:g} is too small next to the others for {self.arithmetic}"
             raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
         self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
         self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)

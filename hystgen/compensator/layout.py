@@ -53,7 +53,7 @@ class Tables(NamedTuple):
         return len(self.stage_kind) > 0
 
     def new_corners(self) -> Memory:
-        """Memory for one instance in the corner engine; `init` of its operations sets its values."""
+        """Memory for one instance in the corner engine; its `init` operation sets the values."""
         return new_memory(len(self.threshold) - 1, self.threshold.dtype)
 
 
@@ -97,7 +97,7 @@ class FixedTables(NamedTuple):
         return self.fronts > 0
 
     def new_corners(self) -> FixedMemory:
-        """Memory for one instance in the corner engine; `init` of its operations sets its values."""
+        """Memory for one instance in the corner engine; its `init` operation sets the values."""
         return new_fixed_memory(len(self.threshold) - 1, self.threshold.dtype)
 
 

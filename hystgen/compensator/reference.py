@@ -88,7 +88,7 @@ def _chain_operations(
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
-    """Memory for one instance of an operator; `init` of its operations sets it."""
+    """Memory for one instance of an operator; its `init` operation sets the values."""
     if not isinstance(t, Tables | FixedTables):
         from hystgen.compensator.chain import step as chain_step
 

@@ -164,7 +164,7 @@ def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer
 
     @jit
     def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
         loop_rest(s, t.limits[ZERO])
         begin(t, s, 2 * inverse + 1)
 
@@ -249,7 +249,7 @@ def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forw
 
     @jit(inline=True)
     def reset(t: Limited, m: Stepping) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
         begin(t, m, 1)
 
     @jit(inline=True)
@@ -400,7 +400,7 @@ def made_of(
 
         @jit(inline=True)
         def reset(t: Tables | FixedTables, s: State) -> None:
-            """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+            """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
             plays_reset(t, s, inverse)
 
         return operations_of(inverse, init, reset, visit, hooks)

@@ -63,7 +63,7 @@ class Function:
 
     @property
     def statements(self) -> str:
-        """Its body on one line, without marks of unused parameters."""
+        """The body on one line, without marks of unused parameters."""
         return " ".join(_COMMENT.sub("", _MARK.sub("", self.body)).split())
 
     def text(self) -> str:

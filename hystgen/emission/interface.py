@@ -88,7 +88,8 @@ def reading(one: EmittedModel) -> list[str]:
 
 
 def _averaged(compiled: Compiled) -> list[str]:
-    """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and what they cost."""
+    """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and their
+    drawbacks."""
     from hystgen.compensator.chain.layout import LEAST_LATE
 
     found = []
@@ -118,7 +119,7 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
         return []
     most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
     return [
-        "Branches: the drive turns to the other branch only if that misses the reference by less, at first, than "
+        "Branches: the drive turns to the other branch only if that misses the reference by less initially than "
         f"staying on its own branch; this leaves an error of at most {most} at rest"
     ]
 
@@ -279,7 +280,7 @@ def _timing(one: EmittedModel) -> list[Macro]:
         *found,
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest reference-to-drive gain, relative to that at rest"),
-        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, per second, for which the errors below hold"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "drive change per second up to which the errors below hold"),
         *one.form.code_sizes(compiled.tables),
     ]
 
@@ -310,7 +311,7 @@ ORDER = {
     "init": "before every other call; may be repeated at any time",
     "reset": _FIRST,
     "step": "after init; once every sample time, from one context",
-    "commit": "after a step and before the next one, any number of times; before the first step it gives a first drive",
+    "commit": "after a step and before the next one, any number of times; before the first step it sets a first drive",
     "status": _FIRST,
     "push": "after init and before the first step",
     "settle": _FIRST,
@@ -459,7 +460,7 @@ WORDS = (
     ("play", r"\bplays?\b",
      "holds its value until its input is a threshold away, and then follows at that distance"),
     ("move", _CORNERS,
-     "the rise or the fall of the input from one turning point to the next. Lengths are taken along the move, "
+     "the rise or the fall of the input from one turning point to the next. Lengths are measured along the move, "
      "so a falling move is a rising one with all signs changed"),
     ("corner", _CORNERS,
      "a turning point from which some plays still hold their values; corners are a stack, the newest one on top"),
@@ -476,8 +477,7 @@ WORDS = (
      "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
      "through it; solve: the input for an output now; resting: the input for an output at rest"),
     ("pending", r"\bpending\b",
-     "the last returned drive: it enters the memory only when the next call absorbs it, or the drive committed in its "
-     "place"),
+     "the last returned drive; the next call absorbs it into the memory, or the drive committed in its place"),
 )
 """Each word, a pattern that texts with this word contain, and its meaning."""
 

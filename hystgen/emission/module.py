@@ -85,8 +85,8 @@ def _variant(
 @dataclass(frozen=True)
 class Code:
     """The C text of a model: types of its tables and of its instances (`states`), functions (`kernels`, `operators`),
-    the macros and tables that these use (`plays`: with an entry for each play; `beside`: the others), and `data`, which
-    all of it keeps in memory."""
+    the macros and tables that these use (`plays`: with an entry for each play; `beside`: the others), and `data`: all
+    that these keep in memory."""
 
     types: str
     states: str

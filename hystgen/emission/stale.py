@@ -131,7 +131,7 @@ def advice(
     models: Sequence[Stale], unwritten: Sequence[Orphan], folder: str, given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
-    """Commands that resolve the differences of all models and their orphans, each with its effect.
+    """Commands that resolve all differences and orphans, each with its effect.
 
     One command writes everything as asked. For files made with other options, one command per set of options confirms
     them or writes them again with those. `given`: options of the command line; `effects`: files of a user's own

@@ -9,7 +9,7 @@ from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, FINE
 
 HALF = 1 << 30
 
-# the curves of the memoryless part, two branches of each
+# the curves of the memoryless part, each with two branches
 FORWARD, INVERSE = 0, 2
 
 

@@ -230,7 +230,7 @@ class _Checker:
         return list(part.model_fields)
 
     def _empty_values(self) -> None:
-        """Keys without a value, which pydantic accepts if None is the default."""
+        """Report keys without a value, which pydantic accepts if None is the default."""
         todo: list[tuple[Path, object]] = [((), self.data)]
         while todo:
             path, value = todo.pop()
@@ -245,7 +245,7 @@ class _Checker:
     # How values fit together ------------------------------------------------------------------------------
 
     def fit(self) -> None:
-        """Everything that pydantic does not check, on the parts whose structure is sound."""
+        """Check what pydantic does not, in the parts whose structure is sound."""
         name = self.get("name")
         if name is not None and (problem := name_problem(name)):
             self.add(("name",), problem)

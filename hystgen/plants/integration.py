@@ -63,5 +63,5 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
 
 
 def _at(slope: Slope, sign: float, along: float, y: Array) -> float:
-    """Slope along a variable that always increases: only then does odeint respect tcrit and evaluate none beyond it."""
+    """Slope along a variable that always increases: only then does odeint respect tcrit and stay within the move."""
     return sign * slope(sign * along, float(y[0]))

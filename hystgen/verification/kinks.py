@@ -70,7 +70,8 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path of kinks, each met to within one last bit, for the current memory and for that of init and reset."""
+    """A path through kinks, each reached to within one last bit, of the current memory and of that of init and
+    reset."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     memory = _Textbook(tables)

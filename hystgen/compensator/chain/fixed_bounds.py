@@ -6,11 +6,11 @@ states to lower bits; a state keeps each rounding for 1/rate samples. The drive 
 sent: the plays see that rounding error, or `rate/2` codes of it behind a lag. Errors are in units of signals in front
 of the plays and in output codes behind them.
 
-A led lag misses its target by a second difference, so plays behind it see a signal other than the one solved for: their
-memories differ for two drives, and the lead amplifies that up to the range of the drive. A user's own block in front
-has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double precision
-that has seen the same drives. With a memoryless part it holds only while nothing is limited, since a lag in front of it
-cannot be led beyond the drive's range.
+A lag that is led misses its target by a second difference, so plays behind it see a signal other than the one solved
+for: their memories differ for two drives, and the lead amplifies that up to the range of the drive. A user's own block
+in front has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double
+precision that has seen the same drives. With a memoryless part it holds only while nothing is limited, since a lag in
+front of it cannot be led beyond the drive's range.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Bounds:
     `formats`: the blocks of each part; `bends`: the curve and inverse curve of each map that has them; `ends`: range of
     the output; `slewed`: rounding error of a slew-limited drive, in drive codes; `reached`: whether the block in front
     can be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front
-    of the plays below their input; `bumps`: curves of bent plays.
+    of the plays below the last bit of their input; `bumps`: curves of bent plays.
     """
 
     static: StaticModel
@@ -234,8 +234,8 @@ class Bounds:
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
     def _dashpot(self, step: float, way: float) -> float:
-        """How far plays with a nonlinear dashpot can be from those of the model because of the table, and because a
-        slow input is treated as standing still within a step."""
+        """Largest deviation of plays with a nonlinear dashpot from the model's, caused by the table and by treating a
+        slow input as standing still within a step."""
         t = self.tables.moving
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
         return yield_error(t, self.static, self.parts.plays, self.seconds, step, way) + seen * way

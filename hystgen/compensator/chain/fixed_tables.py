@@ -409,7 +409,7 @@ class _Builder:
         return MapTables(np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found)
 
     def _bend(self, wanted: Wanted) -> Bend:
-        """A curve of a map, fitted."""
+        """The fitted curve of a map."""
         function, low, high, largest = wanted
         scale = 2.0**self.bits
         drop = max(0, math.ceil(math.log2(max(-low, high) * scale)) - BEND_BITS)

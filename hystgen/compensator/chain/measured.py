@@ -1,8 +1,8 @@
 """The largest error of an inverse found by a search, for models whose bound is the whole range of the drive.
 
-A led lag misses its target by a second difference, so the memory of the plays behind it differs from the one solved
-for, and no sum of roundings tells how far apart the drives of two arithmetics may get. The error found is typical for
-references like these; it is not a bound.
+A lag that is led misses its target by a second difference, so the memory of the plays behind it differs from the one
+solved for, and no sum of roundings tells how far apart the drives of two arithmetics may get. The error found is
+typical for references like these; it is not a bound.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ class _Creep(Effect):
     shown_by: ClassVar[Mapping[str, int]] = {"holds": 1, "slow_reversals": 1, "settling": 1, "reversals": 1}
     rank: ClassVar[float] = 0
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
+    compensation: ClassVar[str] = "exact and causal: solved for the plays, with the states known"
 
 
 class ExponentialCreep(_Creep):
@@ -127,7 +127,7 @@ class ExponentialCreep(_Creep):
         return _fading(run, np.array(self.time_constants))
 
     def largest(self, run: Run) -> Array:
-        """One span each: a state lags behind the play sum by at most its span."""
+        """The weights: a state lags behind the play sum by at most the sum's span."""
         return np.array(self.weights)
 
     @classmethod
@@ -213,7 +213,7 @@ class LogarithmicCreep(_Creep):
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """The weight of a decade for each: its states lag behind the play sum by at most its span."""
+        """The weight of a decade for each: its states lag behind the play sum by at most the sum's span."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 

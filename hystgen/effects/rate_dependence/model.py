@@ -298,10 +298,10 @@ class ThresholdRate(_RateDependence):
         closing = falls > 0.0
         if not np.any(closing):
             return []
-        return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
+        return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} per second"]
 
     def time_scale(self, drive_range: float) -> float:
-        """The largest beta: the plays are as late as behind a dashpot of that time constant."""
+        """The largest beta: the plays lag as much as with a dashpot of that time constant."""
         return max(self.betas)
 
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
@@ -340,9 +340,10 @@ class ThresholdRate(_RateDependence):
 class RelaxingPlays(_RateDependence):
     """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` the part of its argument beyond +/- r.
 
-    A dashpot parallel to the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
-    nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. For straight `w` the
-    linear case is exact, including contacts within a step; the nonlinear one is within about 1e-6 of r_n per step.
+    Every play has a dashpot parallel to its dry friction; with tau = 0 it is an ordinary play. With `exponent` m the
+    dashpot is nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. For
+    straight `w` the linear case is exact, including contacts within a step; the nonlinear one is within about 1e-6 of
+    r_n per step.
     """
 
     shape: Literal["relaxation"] = Field(description="plays that follow viscously")

@@ -162,7 +162,7 @@ class SlewLimit(_SlewLimit):
     Exact if `v` is linear between samples.
     """
 
-    shape: Literal["straight"] = Field(default="straight", description="the drive is straight between samples")
+    shape: Literal["straight"] = Field(default="straight", description="the drive is linear between samples")
 
     later: ClassVar[tuple[str, ...]] = ("shape",)
 

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 e201b7afcfec7cbc8f3176d7cc0c99d0bbe77e8e9f63557c8d15f5361a949476, without this line
+ * Text: sha256 38e4b3b68802b9fb82fefeb5564643abd775f8e4553f271323c0a470e8688c9f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -13,8 +13,8 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   pending: the last returned drive: it enters the memory only when the next call absorbs it, or the
-       drive committed in its place.
+   pending: the last returned drive; the next call absorbs it into the memory, or the drive
+       committed in its place.
 */
 
 /* Products are rounded before they are added, whatever the compiler's default. clang and others

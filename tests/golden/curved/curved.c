@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e1c45dc7ffa08e21b4b77c263633779f3809fca82762a32076a0c8473f0a7362, without this line
+ * Text: sha256 64d95d48425913bfc2d46b30d4dd5c7cc0c4a6e89106657b6a1c68d4e99b9f1f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 9edd502e2bfd126532c6690f78304234e59e1fce2f7abcb528550d754ac7210b, without this line
+ * Text: sha256 22eb0f9bbcef5246e2f01991bd3defead0fa5d1032a14c8f25f41a9838e39b74, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.

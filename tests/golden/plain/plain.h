@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 65429d64697692b3fa67a41a5e86d108d276238005c5fe812b10d33426eef2e9, without this line
+ * Text: sha256 fed65ad3293fc50a68f28eae6d1f8e36b87bc97250bd002e98e9307579faa00d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -177,7 +177,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD
  * @note Cost: at most that of a step

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 4667eb54c572d72933bc57151908dfd3f47cd360ff3aaaf4baf03f3a0936c6a8, without this line
+ * Text: sha256 2c03963bd593cec87fabd194270978c1a075ca3316fad05cc96bac56c96a1e5d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -197,7 +197,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD
  * @note Cost: at most that of a step
@@ -227,7 +227,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
