@@ -1,4 +1,4 @@
-"""Models as frozen objects that can be simulated; their parts are implemented in the packages imported here.
+"""Models as frozen objects that can be simulated, assembled from the parts in the packages imported here.
 
 `PI` is the play sum, `DeadZone` and `TanhEnvelope` are the memoryless parts in front of it, and `Cascade` is the whole
 actuator: stages in order from the drive, the play sum, an output offset and the drive range it is used in.

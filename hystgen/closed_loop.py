@@ -56,8 +56,7 @@ Array = NDArray[np.float64]
 class LoopPart(Protocol):
     """A part of the loop that has a memory.
 
-    A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
-    out).
+    A controller (error in, demand out), compensator (demand in, drive out) or actuator (drive in, displacement out).
     """
 
     def reset(self) -> None:
@@ -100,15 +99,15 @@ class Response:
     displacement: Array
 
     def max_error(self, start: float = 0.0) -> float:
-        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError if no sample is left."""
+        """Largest `|error|` at the samples from `start` (s) on. Raises ValueError if there are none."""
         return float(np.max(np.abs(self._error_from(start))))
 
     def rms_error(self, start: float = 0.0) -> float:
-        """Root mean square error from `start` (s) on. Raises ValueError if no sample is left."""
+        """Root mean square error of the samples from `start` (s) on. Raises ValueError if there are none."""
         return float(np.sqrt(np.mean(self._error_from(start) ** 2)))
 
     def _error_from(self, start: float) -> Array:
-        # a start meant to fall on a sample includes that sample despite rounding
+        # a start that is meant to fall on a sample includes it despite rounding
         kept = self.error[self.t >= start - 1e-9 * abs(start)]
         if not len(kept):
             raise ValueError(f"the response ends at {self.t[-1]:g} s, before {start:g} s")
@@ -203,7 +202,7 @@ class Loop:
         except (TypeError, ValueError):
             r = np.empty(0)
         if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
-            raise ValueError("a reference has to be one finite number per sample, for at least one sample")
+            raise ValueError("a reference must have at least one sample, and all samples must be finite")
         return r
 
 
@@ -231,7 +230,7 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
         raise ValueError(f"{what} has non-finite coefficients")
     if space.dt is None:
-        # the entries of a companion matrix differ by orders of magnitude, which costs up to half the digits
+        # the entries of a companion matrix differ by orders of magnitude, so up to half the digits are lost
         a, (scale, _) = linalg.matrix_balance(a, permute=False, separate=True)
         a, b, c, d, _ = signal.cont2discrete((a, b / scale[:, None], c * scale, d), sample_time, "zoh")
     elif space.dt is True:
@@ -269,7 +268,7 @@ def _block(part: object, sample_time: float, what: str) -> LoopPart:
         return part
     if callable(part) and not isinstance(part, type):
         return _Function(part)
-    raise TypeError(f"{what} is not a part that a loop can have: {part!r}")
+    raise TypeError(f"{what} cannot be a part of a loop: {part!r}")
 
 
 class _Function:
@@ -329,7 +328,7 @@ class _Operator:
 
 
 class _InUnits:
-    """An operator in its arithmetic's number format between two converters: physical units in and out.
+    """An operator between two converters: physical units in and out, numbers of its arithmetic inside.
 
     A fixed-point operator gets the nearest code, ties away from zero, limited to the type; a NaN repeats the last code.
     """

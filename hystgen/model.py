@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[share of its range] The farthest that one code of the reference may move the drive; in fixed point, more than that
-is noise."""
+"""[fraction of the drive's range] Largest move of the drive for a code of the reference in fixed point; more is
+noise."""
 
 MOST_GAIN = 100.0
 """[times the gain at rest] Largest noise gain of an inverse unless the user allows more: white noise of 1e-4 of the
@@ -47,7 +47,7 @@ reference's range then becomes 0.6 to 1.5 % of the drive's range, about MOST_A_C
 benchmarks/chosen_numbers.py noisy."""
 
 SETTLED = 0.01
-"""Default error within which the output counts as settled after a step, as a share of the final step."""
+"""[fraction of the final step] Default error within which the output counts as settled after a step."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -138,7 +138,7 @@ class Model:
             )
 
     def need_compensated(self, arithmetic: str, operator: str) -> None:
-        """Raise, with all reasons, if an operator in `arithmetic` cannot include all of the model's effects.
+        """Raise an error with all reasons if an operator in `arithmetic` cannot include all of the model's effects.
 
         Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse` does.
         """
@@ -225,7 +225,7 @@ class Model:
             own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
             if own and (engine or emit.engine) == "corners":
                 raise UnsupportedEffectsError(
-                    f"engine corners derives the plays from the turning points of the drive, but {' and '.join(own)} "
+                    f"the corner engine derives plays from the turning points of the drive, but {' and '.join(own)} "
                     "moves or bends each play in its own way; give --engine loop, or auto"
                 )
             if own:
@@ -359,30 +359,29 @@ class Model:
             raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
         times = np.array(np.arange(len(drive)) * period if t is None else arguments.signal("t", t), dtype=np.float64)
         if not isinstance(extra or {}, Mapping):
-            raise TypeError(f"extra is a mapping of names to arrays, not {arguments.kind(extra)}")
+            raise TypeError(f"extra must be a mapping of names to arrays, not {arguments.kind(extra)}")
         columns = {
             name: np.array(arguments.signal(name, values), dtype=np.float64) for name, values in (extra or {}).items()
         }
         for name, values in (("v", drive), ("t", times), *columns.items()):
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
-                raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one per sample of v")
+                raise EffectsError(f"{name} must have {len(drive)} finite numbers, one per sample of v")
         if np.any(np.diff(times) <= 0.0):
-            raise EffectsError("t has to increase from sample to sample")
+            raise EffectsError("t must increase from each sample to the next")
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """How long the output takes to settle close to its final value after a full-range step of the drive, up and
-        down.
+        """Settling times of the output after full-range steps of the drive, up and down.
 
-        `within`: the error, as a share of the final step of the output. Found by simulating the steps with all effects,
-        up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one of the
-        user's own effects fails on such a step.
+        `within`: the error, as a fraction of the final step of the output. Found by simulating the steps with all
+        effects, up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one
+        of the user's own effects fails on such a step.
         """
         from hystgen.chain.settling import settling
 
-        within = arguments.number("within", within, "the final step, as a share")
+        within = arguments.number("within", within, "fraction of the final step")
         if not 0.0 < within < 1.0:
-            raise ValueError(f"within is a share of the final step between 0 and 1, not {within:g}; give 0.01 for 1 %")
+            raise ValueError(f"within must be a fraction between 0 and 1, not {within:g}; give 0.01 for 1 %")
         return settling(self.chain, within)
 
     def inverse(self) -> InverseModel:
@@ -454,10 +453,10 @@ class InverseModel:
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The samples `x` (N,), each non-finite one replaced by the last finite one before it, and a mask of those
-    replaced.
+    """The samples `x` (N,), non-finite ones replaced by the last finite one before, and a mask of those replaced.
 
-    Those before the first finite one become `first` or, if that is None, that one. `name`: what messages call `x`.
+    Samples before the first finite one become `first` or, if that is None, the first finite one. `name`: what messages
+    call `x`.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)
@@ -488,7 +487,7 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
 
 def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
     if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
-        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect']")
+        raise TypeError(f"effects must be a list of files or classes, not {arguments.kind(sources)}; give ['own.py']")
     found: list[type[Effect]] = []
     for source in sources:
         from hystgen.effects.user import load_user_effects  # only if needed: `emit` has to start fast
@@ -500,7 +499,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
 def check_arithmetic(arithmetic: str) -> None:
     """Raise FormatError for an unknown arithmetic."""
     if arithmetic not in ARITHMETICS:
-        raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
+        raise FormatError(f"arithmetic {arithmetic!r} is not one of {', '.join(ARITHMETICS)}")
 
 
 class HasModel(Protocol):
@@ -512,11 +511,11 @@ class HasModel(Protocol):
 
 
 ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
-"""A model, an object that has one, or the path of a parameter file."""
+"""A model, an object with one, or the path of a parameter file."""
 
 
 def as_model(source: ModelSource) -> Model:
-    """The model itself, that of a parameter file, or that of an object that has one, such as a fit.
+    """The model given, that of a parameter file, or that of an object with a model, such as a fit.
 
     Raises ParameterError, and TypeError for anything else.
     """

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 def figure(
     name: str, cascade: Cascade, units: Units, inverse: Callable[[Array], Array] | None, effects: bool
 ) -> Figure:
-    """The figure; to be drawn within `drawing.styled`.
+    """The figure; call within `drawing.styled`.
 
     `inverse`: maps references (N,) to drives (N,) inside the drive range; None if no inverse is to be shown; `effects`:
     whether the model has effects, which are not drawn.

@@ -1,4 +1,4 @@
-"""Running a model over sampled signals: in double precision, or as the bit reference of an arithmetic."""
+"""Runs a model on sampled signals, in double precision or as the bit reference of an arithmetic."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def simulate_records(
 ) -> list[Answers]:
     """Outputs of the model (for column v) or its inverse (for column u) over the records of one session, with remarks.
 
-    `history`: drives visited before the first record; `rest`: pause in s before every record, which only effects
-    notice. Records in other units of the same quantity are converted to the model's units. The forward model is not
+    `history`: drives visited before the first record; `rest`: pause in s before every record, which matters only to
+    effects. Records in other units of the same quantity are converted to the model's units. The forward model is not
     limited to `input_range`; the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
     EffectsError, UnsupportedEffectsError and RecordError.
     """

@@ -1,4 +1,4 @@
-"""How well the recorded actuator would track with each compensator: straight line, plays alone, whole model."""
+"""Tracking of the recorded actuator with each compensator: straight line, plays alone, whole model."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOST_UNKNOWN = 0.8
-"""[share of a record] If the drive has not visited both its extremes by this point, the whole record is judged. The rms
-error over a fifth of a record of `examples/` is 0.12 to 2.0 times that over the whole record, over a twentieth 0.02 to
-3.1 times. Set by: benchmarks/chosen_numbers.py unknown."""
+"""[fraction of a record] If the drive has not visited both its extremes by this point, the whole record is judged. The
+rms error over a fifth of a record of `examples/` is 0.12 to 2.0 times that over the whole record, over a twentieth 0.02
+to 3.1 times. Set by: benchmarks/chosen_numbers.py unknown."""
 
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
 """The compensators compared, each of which turns the reference into a drive."""
@@ -36,7 +36,7 @@ class Tracked:
 
     `known`: the sample by which the drive has visited both its extremes, so that the motion before the record no longer
     matters. Errors have their mean from `known` on removed, because the zero of a displacement is arbitrary. `limited`:
-    how the limits of ranges affected each compensator's drives, one sentence each.
+    effects of range limits on each compensator's drives, one sentence each.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Tracking errors that each compensator would leave on the recorded actuator, record by record.
+    """Tracking errors of the recorded actuator with each compensator, record by record.
 
     `left_out`: names of the model's effects, which "plays alone" lacks; `notes`: unit conversions, one sentence each.
     """
@@ -128,15 +128,14 @@ def late(model: Model, records: Sequence[Record]) -> str:
 def track(
     model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0
 ) -> Tracking:
-    """The error that each compensator would leave if the records' motions were the references.
+    """The tracking error with each compensator if the records' motions were the references.
 
-    The recorded actuator is assumed to respond to a drive as the model does, plus the residual of the record:
-    `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive.
-    `straight line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of
-    `model` without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`.
-    `history` and `rest` come before every record; `skip`: seconds at the start of each record that are not compared.
-    Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for units that do not fit
-    the model's.
+    The recorded actuator is assumed to respond to a drive as the model does, plus the residual of the record: `y =
+    model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive. `straight
+    line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
+    without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
+    `rest` come before every record; `skip`: seconds at the start of each record that are not compared. Raises
+    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")

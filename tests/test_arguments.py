@@ -48,26 +48,26 @@ class Frame:
 
 # A call, the type of its error, and a pattern of the message
 SIGNALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
-    "two dimensions": (lambda: MODEL.simulate(np.zeros((5, 2))), ValueError, r"v has .*\(N,\), not shape \(5, 2\)"),
+    "two dimensions": (lambda: MODEL.simulate(np.zeros((5, 2))), ValueError, r"v must .*\(N,\), not shape \(5, 2\)"),
     "a column": (lambda: MODEL.simulate(np.zeros((5, 1))), ValueError, r"pass its .ravel\(\)"),
-    "two, float32": (lambda: MODEL.simulate(np.zeros((5, 2)), "float32"), ValueError, r"v has .* not shape \(5, 2\)"),
-    "two, inverse": (lambda: INVERSE.simulate(np.zeros((5, 2))), ValueError, r"u has .* not shape \(5, 2\)"),
+    "two, float32": (lambda: MODEL.simulate(np.zeros((5, 2)), "float32"), ValueError, r"v must .* not shape \(5, 2\)"),
+    "two, inverse": (lambda: INVERSE.simulate(np.zeros((5, 2))), ValueError, r"u must .* not shape \(5, 2\)"),
     "two, session": (lambda: MODEL.session().run([[1.0]]), ValueError, r"not shape \(1, 1\)"),
     "a table": (lambda: MODEL.simulate(Frame()), ValueError, "pass one of its columns"),
     "ragged": (lambda: MODEL.simulate([[1, 2], [3]]), ValueError, "rows of different lengths"),
     "a file": (lambda: MODEL.simulate("fit.csv"), TypeError, "real numbers .* not 'fit.csv'"),
-    "texts": (lambda: MODEL.simulate(["a", "b"]), TypeError, "v is an array of real numbers"),
+    "texts": (lambda: MODEL.simulate(["a", "b"]), TypeError, "v must be an array of real numbers"),
     "complex": (lambda: MODEL.simulate(np.zeros(4) * 1j), TypeError, "complex128"),
     "nothing": (lambda: MODEL.simulate(None), TypeError, "not None"),
     "a record": (lambda: MODEL.simulate(Record("a", T, V)), TypeError, "not a Record"),
     "a hole": (lambda: MODEL.simulate([1.0, None]), TypeError, "real numbers"),
     "code that is none": (lambda: MODEL.simulate([0.5], "q15"), ValueError, "integers from -32768 to 32767"),
     "code that is nan": (lambda: MODEL.simulate([np.nan], "q15"), ValueError, "integers from -32768"),
-    "arithmetic": (lambda: MODEL.simulate(V, "float16"), ValueError, "'float16' is none of float32"),
-    "engine": (lambda: MODEL.simulate(V, "float32", engine="steam"), ValueError, "'steam' is none of auto, corners"),
-    "operator": (lambda: MODEL.session("sideways"), ValueError, "'sideways' is none of forward, inverse"),
-    "time": (lambda: MODEL.run(V, t=np.zeros((60, 2))), ValueError, r"t has .* not shape \(60, 2\)"),
-    "extra": (lambda: MODEL.run(V, extra=[V]), TypeError, "extra is a mapping of names to arrays"),
+    "arithmetic": (lambda: MODEL.simulate(V, "float16"), ValueError, "'float16' is not one of float32"),
+    "engine": (lambda: MODEL.simulate(V, "float32", engine="steam"), ValueError, "'steam' is not one of auto, corners"),
+    "operator": (lambda: MODEL.session("sideways"), ValueError, "'sideways' is not one of forward, inverse"),
+    "time": (lambda: MODEL.run(V, t=np.zeros((60, 2))), ValueError, r"t must .* not shape \(60, 2\)"),
+    "extra": (lambda: MODEL.run(V, extra=[V]), TypeError, "extra must be a mapping of names to arrays"),
 }
 FILES_AND_MODELS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "load a number": (lambda: hystgen.load(3), TypeError, "parameter file has to be a path, .* not 3"),
@@ -77,8 +77,8 @@ FILES_AND_MODELS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "emit option": (lambda: hystgen.emit(MODEL, "o", arithmetics="q15"), TypeError,
                     r"emit\(\) has no option arithmetics; did you mean arithmetic\?"),
     "emit unlike any": (lambda: hystgen.emit(MODEL, "o", colour="red"), TypeError, "its options are operator"),
-    "emit value": (lambda: hystgen.emit(MODEL, "o", operator=3), ValueError, "operator 3 is none of inverse"),
-    "emit list": (lambda: hystgen.emit(MODEL, "o", layout=["a"]), ValueError, "is none of self-contained"),
+    "emit value": (lambda: hystgen.emit(MODEL, "o", operator=3), ValueError, "operator 3 is not one of inverse"),
+    "emit list": (lambda: hystgen.emit(MODEL, "o", layout=["a"]), ValueError, "is not one of self-contained"),
     "emit a number": (lambda: hystgen.emit(3, "o"), TypeError, "returned by hystgen.load, .* not 3"),
     "emit parameters": (lambda: hystgen.emit(MODEL.parameters, "o"), TypeError, "not a Parameters"),
     "emit nowhere": (lambda: hystgen.emit(MODEL, None), TypeError, "output has to be a path, .* not None"),
@@ -87,13 +87,13 @@ FILES_AND_MODELS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "verify option": (lambda: hystgen.verify(MODEL, target=["host"]), TypeError, "did you mean targets"),
     "verify targets": (lambda: hystgen.verify(MODEL, targets="host"), TypeError, r"not 'host'; give \['host'\]"),
     "verify compiler": (lambda: hystgen.verify(MODEL, compiler="gcc"), TypeError, r"not 'gcc'; give \['gcc'\]"),
-    "verify length": (lambda: hystgen.verify(MODEL, length="5"), TypeError, "length is a whole number of calls"),
+    "verify length": (lambda: hystgen.verify(MODEL, length="5"), TypeError, "length must be a whole number of calls"),
     "verify nothing": (lambda: hystgen.verify(MODEL, length=0), ValueError, "at least 1, not 0"),
     "plan option": (lambda: hystgen.plan(MODEL, maxrate=3), TypeError, "did you mean max_rate"),
     "plan DAC": (lambda: hystgen.plan(MODEL, rate=50, dac_bits=16, dac_range="0,10"), TypeError, "numbers such as"),
     "plan bits": (lambda: hystgen.plan(MODEL, rate=50, dac_bits=12.5, dac_range=(0, 9)), TypeError, "whole number of"),
-    "plan coding": (lambda: hystgen.plan(MODEL, rate=50, dac_coding="gray"), ValueError, "is none of straight"),
-    "plan rate": (lambda: hystgen.plan(MODEL, max_rate="3"), TypeError, "max_rate is a number of input"),
+    "plan coding": (lambda: hystgen.plan(MODEL, rate=50, dac_coding="gray"), ValueError, "is not one of straight"),
+    "plan rate": (lambda: hystgen.plan(MODEL, max_rate="3"), TypeError, "max_rate must be a number"),
     "plan a number": (lambda: hystgen.plan(3), TypeError, "or a parameter file, not 3"),
 }
 RECORDS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
@@ -109,29 +109,29 @@ RECORDS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "read a number": (lambda: read_record(3), TypeError, NO_RECORD),
     "lengths": (lambda: hystgen.identify(Record("a", T, V[:50], V)), ValueError, "60 samples of t and 50"),
     "length of a column": (lambda: hystgen.identify(Record("a", T, V, V, {"c": V[1:]})), ValueError, "and 59 of c"),
-    "a column of v": (lambda: hystgen.identify(Record("a", T, V.reshape(-1, 1), V)), ValueError, "v of a has one"),
-    "texts in v": (lambda: hystgen.identify(Record("a", T, ["x"] * 60, V)), TypeError, "v of a is an array of real"),
+    "a column of v": (lambda: hystgen.identify(Record("a", T, V.reshape(-1, 1), V)), ValueError, "v of a must have"),
+    "texts in v": (lambda: hystgen.identify(Record("a", T, ["x"] * 60, V)), TypeError, "v of a must be an array"),
     "no name": (lambda: hystgen.identify(Record(T, V, V)), TypeError, "name must be text"),
 }
 OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
-    "units as a pair": ({"units": ("V", "nm")}, TypeError, r"units is a mapping .* not a tuple; give {'input': 'V'"),
+    "units as a pair": ({"units": ("V", "nm")}, TypeError, r"units must be .* not a tuple; give {'input': 'V'"),
     "units as text": ({"units": "V,nm"}, TypeError, "not 'V,nm'; give {'input'"),
     "units of the drive": ({"units": {"drive": "V"}}, ValueError, "units has no drive; its keys are input, output"),
     "units of a number": ({"units": {"input": 3}}, TypeError, "it contains 3"),
     "name of an option": ({"threshold": 3}, TypeError, r"\(\) has no option threshold; did you mean thresholds\?"),
-    "history of one": ({"history": 5}, TypeError, r"history is a list .* not 5; give a list .* \[100, -100\]"),
+    "history of one": ({"history": 5}, TypeError, r"history must be a list .* not 5; give a list .* \[100, -100\]"),
     "history as text": ({"history": "100,-100"}, TypeError, "not '100,-100'; give a list"),
     "history of texts": ({"history": ["a"]}, TypeError, "history .* an entry is not a number"),
-    "rest": ({"rest": "1"}, TypeError, "rest is a number of seconds, not '1'"),
-    "skip": ({"skip": -2.5}, ValueError, "skip is a number of seconds, not negative, not -2.5"),
-    "columns as text": ({"columns": "t=Time"}, TypeError, "columns is a mapping .* not 't=Time'; give {'t': 'Time'"),
-    "columns as a list": ({"columns": ["t", "v"]}, TypeError, "columns is a mapping .* not a list"),
-    "sample time": ({"sample_time": "1"}, TypeError, "sample_time is a number of seconds, not '1'"),
+    "rest": ({"rest": "1"}, TypeError, r"rest must be a number \(seconds\), not '1'"),
+    "skip": ({"skip": -2.5}, ValueError, "skip must be a finite nonnegative number .* -2.5"),
+    "columns as text": ({"columns": "t=Time"}, TypeError, "columns must be .* not 't=Time'; give {'t': 'Time'"),
+    "columns as a list": ({"columns": ["t", "v"]}, TypeError, "columns must be a mapping .* not a list"),
+    "sample time": ({"sample_time": "1"}, TypeError, r"sample_time must be a number \(s.*, not '1'"),
     "delimiter": ({"delimiter": 3}, TypeError, "delimiter has to be a character"),
-    "model": ({"model": ["pi"]}, ValueError, "model .* is none of pi, gpi-deadzone"),
-    "floor": ({"p0_floor": "0.1"}, TypeError, "p0_floor is a number"),
-    "thresholds": ({"thresholds": np.zeros((2, 2))}, TypeError, "thresholds is a list of finite numbers"),
-    "thresholds by name": ({"thresholds": {1: 2}}, TypeError, "thresholds is a list of finite numbers, not a dict"),
+    "model": ({"model": ["pi"]}, ValueError, "model .* is not one of pi, gpi-deadzone"),
+    "floor": ({"p0_floor": "0.1"}, TypeError, "p0_floor must be a number"),
+    "thresholds": ({"thresholds": np.zeros((2, 2))}, TypeError, "thresholds must be a list of finite numbers"),
+    "thresholds by name": ({"thresholds": {1: 2}}, TypeError, "thresholds must be a list .* not a dict"),
 }
 
 
@@ -165,12 +165,12 @@ def test_wrong_options_of_a_fit(name: str, tmp_path: Path, monkeypatch: pytest.M
 
 def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
     for options, error, words in (
-        ({"hold": REC}, TypeError, "did you mean holdout"), ({"history": 3}, TypeError, "history is a list"),
-        ({"rest": "a"}, TypeError, "rest is a number of seconds"), ({"effects": ["my.py"]}, TypeError, "be classes"),
+        ({"hold": REC}, TypeError, "did you mean holdout"), ({"history": 3}, TypeError, "history must be a list"),
+        ({"rest": "a"}, TypeError, "rest must be a number"), ({"effects": ["my.py"]}, TypeError, "be classes"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.diagnose(MODEL, REC, **options), error, words)
     for options, error, words in (
-        ({"jobs": "2"}, TypeError, "jobs is a whole number"), ({"jobs": 0}, ValueError, "at least 1"),
+        ({"jobs": "2"}, TypeError, "jobs must be a whole number"), ({"jobs": 0}, ValueError, "at least 1"),
         ({"emission": {"arithmetics": "q15"}}, TypeError, "did you mean arithmetic"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.identify_batch(REC, tmp_path / "o", **options), error, words)

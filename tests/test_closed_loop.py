@@ -591,7 +591,7 @@ TWICE = Bang()
         ({"controller": signal.dlti([1.0], [1.0, 0.5], dt=0.2)}, ValueError, "the controller has a sample time of 0.2"),
         ({"controller": None}, TypeError, "a loop needs a controller"),
         ({"controller": signal.lti([1.0], [1.0, 0.0])}, TypeError, "the controller is a continuous system"),
-        ({"compensator": "inverse"}, TypeError, "the compensator is not a part that a loop can have"),
+        ({"compensator": "inverse"}, TypeError, "the compensator cannot be a part of a loop"),
         ({"hysteresis": PI}, TypeError, "the hysteresis is not a part"),
     ],
 )
@@ -638,7 +638,7 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
             loop.run(reference, duration)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="operator 'both' is neither inverse nor forward"):
         CompiledC(model(NOTE), "both")
-    with pytest.raises(ValueError, match="compiler 'ls' is none of gcc, clang, zig"):
+    with pytest.raises(ValueError, match="compiler 'ls' is not one of gcc, clang, zig"):
         CompiledC(model(NOTE), compiler="ls")
     with monkeypatch.context() as patch:
         patch.setattr(compilers, "find", lambda _: None)

@@ -1046,8 +1046,8 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
     cold = warm.simulate(v, extra={"temperature": np.full(len(v), 20.0)})
     assert np.allclose(cold, CASCADE.simulate(v), atol=1e-12)
     for wrong, said in (
-        ({"t": t[::-1]}, "t has to increase"), ({"t": t[1:]}, "t has to be 2000 finite"),
-        ({"t": t, "extra": {"temperature": [1.0]}}, "temperature has to be 2000"),
+        ({"t": t[::-1]}, "t must increase"), ({"t": t[1:]}, "t must have 2000 finite"),
+        ({"t": t, "extra": {"temperature": [1.0]}}, "temperature must have 2000"),
     ):  # fmt: skip
         with pytest.raises(EffectsError, match=said):
             warm.simulate(v, **wrong)
@@ -1354,7 +1354,7 @@ def test_show_lists_effects_and_what_they_mean(run: Callable[..., tuple[int, str
     assert (code, err) == (0, "")
     assert "lag\n        time_constant = 0.0125: tau, s; 0 is no lag\n        compensation: a lead, exact on" in out
     assert "rate_dependence, threshold\n        betas = [0.3, 0.2, 0.1]: " in out
-    assert "thresholds stay in order up to |w'| = 4.5 a second" in out
+    assert "thresholds stay in order up to |w'| = 4.5 per second" in out
     assert "inverse  " not in out
     assert (tmp_path / "stage.svg").stat().st_size > 1000
 

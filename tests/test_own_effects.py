@@ -308,7 +308,7 @@ BAD_C = {
     "number": (STEP, f"0.5f * {STEP}", ":39: a number with a fraction; put it in the table"),
     "division": ("y - self->reached)", "y / self->reached)", ":32: a division; put the reciprocal in the table"),
     "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a preprocessor line; only #include"),
-    "call": ("return self->reached;", "return sin(self->reached);", ":40: sin is called but not in the file"),
+    "call": ("return self->reached;", "return sin(self->reached);", ":40: sin is called but not defined"),
     "type": (MEMORY, "double reached;", ":9: double; write hystgen_signal_t"),
     "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared differently; write typedef"),
     "swapped": (RATES, RATES.replace("rate", "other_rate", 1), f":3: {TABLE} is declared differently"),

@@ -13,8 +13,8 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "hystgen: build without -fassociative-math: the order of additions is part of the answer"
 #endif
-/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
-   own macro stays. */
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in every C++ dialect of avr-gcc 5; the
+   compiler's own macro remains defined. */
 #if defined(FLT_EVAL_METHOD)
 #define HYSTGEN_EVAL_METHOD FLT_EVAL_METHOD
 #elif defined(__FLT_EVAL_METHOD__)

@@ -1,4 +1,4 @@
-/* Included first by files for float64 only, so that they compile when opened in an editor. */
+/* Files only for float64 include this first, so that they compile when opened in an editor. */
 #ifndef HYSTGEN_REAL_IS_DOUBLE
 #define HYSTGEN_REAL_IS_DOUBLE
 #endif

@@ -1,5 +1,4 @@
-/* The types of a model's numbers and the storage classes of its functions, by arithmetic. Needed by
-   every other file. */
+/* Number types and storage classes for each arithmetic. Needed by every other file. */
 #ifndef HYSTGEN_NUMBERS_H
 #define HYSTGEN_NUMBERS_H
 
@@ -10,8 +9,8 @@
 #include "arithmetic/build.h"
 #include "arithmetic/soft_float.h"
 
-/* Types of a model's numbers: a single one in floating point, integers as wide as necessary in
-   fixed point. play: inputs of the plays; reach: inputs at which plays start to follow; sum:
+/* Types of a model's numbers: one type for all in floating point, integers of the necessary widths
+   in fixed point. play: inputs of the plays; reach: inputs at which plays start to follow; sum:
    outputs before rounding; low: the lower part of the sum stored in a corner. */
 #if defined(HYSTGEN_FIXED)
 #ifdef HYSTGEN_REAL_IS_SHORT
@@ -42,8 +41,8 @@ typedef hystgen_real_t hystgen_sum_t;
 
 /* In a model with effects, signal: a value between blocks, in fixed point wider than a code; fine:
    the output of the drive side, in fixed point finer than a code; travel: the distance covered by
-   the drive. Without effects, and in floating point, all of them have the caller's type, except
-   that signals of engine loop are sums of its plays. */
+   the drive. Without effects, and in floating point, all of them have the caller's type; only the
+   loop engine's signals in fixed point have the type of its play sums. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef hystgen_play_t hystgen_fine_t;

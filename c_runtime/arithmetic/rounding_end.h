@@ -1,4 +1,4 @@
-/* In floating point, after all code of a single header: restores the user's settings. */
+/* Ends a single header in floating point: restores the user's settings. */
 
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT DEFAULT

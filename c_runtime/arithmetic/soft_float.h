@@ -1,4 +1,4 @@
-/* Whether floating-point operations are library calls here: engine corners then avoids them. */
+/* Whether floating-point operations are library calls here; the corner engine then avoids them. */
 
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 #if (defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0)) ||                           \

@@ -3,13 +3,13 @@
 #include "hystgen_runtime.h"
 
 /*
- * atanh x for |x| < 1, without division. Any other x, NaN included, counts as the largest float
- * below 1.
+ * atanh x for |x| < 1, without division. Any other x, NaN included, is replaced by the largest
+ * float below 1.
  *
  * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
  * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
  * the distances d and e from the center of a piece of [1, 2); each center is a point whose
- * logarithm is almost a float. k and the pieces are read off the integer 2^24 (1 - |x|).
+ * logarithm is almost a float. k and the piece are read off the integer 2^24 (1 - |x|).
  * fit_coefficients.py derives the numbers. Worst error over all floats: 1.07 ulp, and 0.84 where
  * |x| < 0.999. The function is odd and never decreases; it keeps subnormal numbers and the sign of
  * zero.
@@ -31,7 +31,7 @@ static const hystgen_real_t hystgen_atanh_row[8][5] = {
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
-/* The piece of [1, 2) that holds m / 2^24. */
+/* Index of the piece of [1, 2) that contains m / 2^24. */
 static inline unsigned int hystgen_atanh_piece(uint_least32_t m) {
     return (unsigned int)(m >> 21) & 7u;
 }

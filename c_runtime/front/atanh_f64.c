@@ -4,13 +4,13 @@
 #include "hystgen_runtime.h"
 
 /*
- * atanh x for |x| < 1, without division. Any other x, NaN included, counts as the largest double
- * below 1.
+ * atanh x for |x| < 1, without division. Any other x, NaN included, is replaced by the largest
+ * double below 1.
  *
  * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
  * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
  * the distances d and e from the center of a piece of [1, 2); each center is a point whose
- * logarithm is almost a double. k and the pieces are read off the integer 2^53 (1 - |x|).
+ * logarithm is almost a double. k and the piece are read off the integer 2^53 (1 - |x|).
  * fit_coefficients.py derives the numbers and the bound on the error: 1.48 ulp. The function is
  * odd; it keeps subnormal numbers and the sign of zero.
  */
@@ -51,7 +51,7 @@ static const hystgen_real_t hystgen_atanh_row[8][11] = {
      -0.008872914618661135, 0.0036639147803697886, -0.0015759958357201482, 0.0006972571680012851,
      -0.00031316844998055933, 0.0001451208468374469, -0.00022989476911220504}};
 
-/* The piece of [1, 2) that holds m / 2^53. */
+/* Index of the piece of [1, 2) that contains m / 2^53. */
 static inline unsigned int hystgen_atanh_piece(uint_least64_t m) {
     return (unsigned int)(m >> 50) & 7u;
 }

@@ -1,4 +1,4 @@
-/* A memoryless part in fixed point: piecewise polynomials, and rounding to the nearest integer.
+/* The memoryless part in fixed point: piecewise polynomials, and rounding to the nearest integer.
    Called by front.c and by the curves of effects. */
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
@@ -12,7 +12,7 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
 }
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
-   Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
+   Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
    coefficients from degree 0. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,

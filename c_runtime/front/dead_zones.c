@@ -2,7 +2,7 @@
    writes for a model's stages. */
 #include "hystgen_runtime.h"
 
-/* Output of a dead-zone sum at x; bisects for the straight piece. */
+/* Output of a dead-zone sum at x; finds the straight piece by bisection. */
 HYSTGEN_API hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z,
                                                      hystgen_real_t x) {
     unsigned int low = 0;
@@ -18,7 +18,7 @@ HYSTGEN_API hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Input of a dead-zone sum at its output y; bisects for the straight piece. */
+/* Input of a dead-zone sum for its output y; finds the straight piece by bisection. */
 HYSTGEN_API hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z,
                                                      hystgen_real_t y) {
     unsigned int low = 0;

@@ -1,6 +1,6 @@
-/* From a drive to the input of the plays and back: the curves of a memoryless part in fixed point,
-   or the drive itself where there is none. In floating point, emission writes these functions from
-   the stages. Called by the operators. */
+/* From a drive to the input of the plays and back: in fixed point through the curves of the
+   memoryless part, or unchanged if the model has none. In floating point, emission writes these
+   functions from the stages. Called by the operators. */
 #ifndef HYSTGEN_FRONT_FRONT_C
 #define HYSTGEN_FRONT_FRONT_C
 #include "compensator/model.h"
@@ -18,7 +18,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
         hystgen_front_descending_coefficient, HYSTGEN_FRONT_DESCENDING_PIECES, HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w] on one branch, or the end of the branch for w beyond it. */
+/* v = G^-1[w] on one branch; for w beyond the branch, its end. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends =
@@ -48,7 +48,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
                                          HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w], or an end of G for w beyond it. */
+/* v = G^-1[w]; for w beyond G, the nearer end of G. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends = &hystgen_back_ends;

@@ -1,4 +1,4 @@
-"""The arithmetics in which compensators can be emitted, each an object that holds everything specific to it."""
+"""The arithmetics in which compensators can be emitted; each is an object with everything specific to it."""
 
 from hystgen.arithmetic.description import Arithmetic
 from hystgen.arithmetic.fixed import Fixed
@@ -11,7 +11,7 @@ from hystgen.arithmetic.q31 import Q31
 FLOATING = {each.name: each for each in (FLOAT32, FLOAT64)}
 FIXED = {each.name: each for each in (Q31, Q15)}
 ARITHMETICS: dict[str, Arithmetic] = {**FLOATING, **FIXED}
-"""By name, in the order in which messages list them."""
+"""All arithmetics by name, in the order in which messages list them."""
 
 __all__ = [
     "ARITHMETICS", "FIXED", "FLOAT32", "FLOAT64", "FLOATING", "Q15", "Q31", "Arithmetic", "Fixed", "Floating",

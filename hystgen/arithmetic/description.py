@@ -1,4 +1,4 @@
-"""What models, tables, C text and verification need to know about an arithmetic."""
+"""The properties of an arithmetic that models, tables, C text and verification need."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Arithmetic(ABC):
 
     `name`: as users write it; `short`: as in names of the run time; `c_type`: C type of inputs and answers,
     NAME_real_t; `number_name`, `bytes`: numpy's name and the size of that type; `finer`: the arithmetic to use if this
-    one is too coarse, if any.
+    one is too coarse; empty if there is none.
 
-    Shared by a kind of arithmetic: `fixed`: whether numbers are codes; `unused`: keys for code sizes in the `emit`
-    section that do not apply; `includes`: C headers needed; `travels`: factor from an argument to a travel, above 1
-    where travels have more bits than codes.
+    The same for all arithmetics of a kind: `fixed`: whether numbers are codes; `unused`: keys for code sizes in the
+    `emit` section that do not apply; `includes`: C headers needed; `travels`: factor from an argument to a travel,
+    above 1 where travels have more bits than codes.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Arithmetic(ABC):
     @cached_property
     @abstractmethod
     def computed(self) -> np.dtype[Any]:
-        """The type that the bit reference computes with."""
+        """The type in which the bit reference computes."""
 
     @cached_property
     @abstractmethod
@@ -67,8 +67,8 @@ class Arithmetic(ABC):
     @cached_property
     @abstractmethod
     def facts(self) -> tuple[str, ...]:
-        """Macros that select variants of the run time."""
+        """Macros that select the variant of the run time."""
 
     @abstractmethod
     def share(self, part: float) -> float:
-        """A share between 0 and 1 as an argument of an emitted function."""
+        """A fraction between 0 and 1 as an argument of an emitted function."""

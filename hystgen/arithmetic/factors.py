@@ -8,13 +8,13 @@ from fractions import Fraction
 from hystgen.basics.jit import jit
 
 LOW_BITS = 20
-"""Low bits of a number, which are multiplied separately; 31 bits remain, and both products fit into 64."""
+"""Number of low bits that are multiplied separately; the upper part then has 31 bits, and both products fit into 64."""
 
 LARGEST = 2**51
-"""Exclusive bound of numbers to be multiplied: their upper part then has 31 bits, like a mantissa."""
+"""Exclusive bound of numbers to be multiplied: their upper part then has no more bits than a mantissa, 31."""
 
 STATE_BITS = 60
-"""Bits of a state without its sign. Ten are dropped before a product, which takes 50; factors have room for that."""
+"""Bits of a state without its sign. A product takes 50 of them; the shifts of factors allow for the ten dropped."""
 
 GUARD = 3
 """Extra low bits of a state. Without them its rounding errors would add up to the last bit of a signal; with them they
@@ -23,8 +23,7 @@ add up to an eighth of it, and a slow state stalls in a dead band of at most 1/1
 From 0 to 8 bits, a mode's error bound in q31 and q15 changes by less than 1e-4, since the factors dominate it."""
 
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
-"""Bits of a mantissa without its sign, and range of shifts: a product drops at least one bit, for rounding, and at most
-62."""
+"""Bits of a mantissa without its sign, and range of shifts: a product drops 1 bit (for rounding) to 62 bits."""
 
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
 """Exclusive bound of factors."""
@@ -49,13 +48,13 @@ def factor(x: float | Fraction) -> tuple[int, int]:
 
 
 def error(x: float | Fraction) -> float:
-    """Absolute error of x when it is rounded to a factor."""
+    """Absolute error of rounding x to a factor."""
     mantissa, shift = factor(x)
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 
 
 def lifted(x: float, bits: int) -> int:
-    """By how many bits a scaling of x by 2^bits has to fall short for the result to be a factor."""
+    """Number of bits by which a scaling of x by 2^bits must be reduced so that the result is a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 

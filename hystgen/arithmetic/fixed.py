@@ -18,7 +18,7 @@ class Fixed(Arithmetic):
     """Fixed point.
 
     `reach`: C type of the input at which a play starts to follow; `code_bits`: bits of a code without its sign;
-    `degree`: degree of the polynomials of the memoryless part; `finer_plays`: whether the plays' input may be finer
+    `degree`: degree of the polynomials of the memoryless part; `finer_plays`: whether the plays' input can be finer
     than a drive code; `play_bits`: bits of the plays' input without its sign, if it is not the drive code itself;
     `low_bits`: bits of a sum that a corner keeps in addition to 32.
     """
@@ -50,7 +50,7 @@ class Fixed(Arithmetic):
 
     @property
     def code_max(self) -> int:
-        """Largest code; codes of answers lie in -code_max .. code_max."""
+        """Largest code; answers lie in -code_max .. code_max."""
         return (1 << self.code_bits) - 1
 
     @cached_property

@@ -1,1 +1,1 @@
-"""Leaves that every room uses: words, messages, files, progress, threads and processes, compiling."""
+"""Basics that all other packages use: wording, messages, files, progress, threads and processes, compiling."""

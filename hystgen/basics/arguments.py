@@ -1,4 +1,4 @@
-"""Arguments of public calls, models, plants and operators: what is wrong with one, and what to pass instead."""
+"""Checks of arguments to public calls, models, plants and operators; messages say what to pass instead."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def kind(value: object) -> str:
-    """How messages name a value: plain values as written, others by type, arrays with their shape."""
+    """A value as messages name it: plain values as written, others by type, arrays with their shape."""
     name = "array" if isinstance(value, np.ndarray) else type(value).__name__
     if isinstance(value, str | int | float | None):
         return f"{printable(repr(value))}"
@@ -58,8 +58,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """As `checked`, for a call that passes its `**options` on to `options_of`, which its signature then lists; `name`:
-    the call's name in messages."""
+    """Like `checked`, for a call that passes its `**options` on to `options_of`; its signature then lists them. `name`:
+    of the call, in messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()
@@ -83,7 +83,7 @@ def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P
 
 
 def path(name: str, value: object) -> str:
-    """A path as text. Raises TypeError."""
+    """The value as a path in text form. Raises TypeError."""
     if isinstance(value, str | os.PathLike):
         found = os.fspath(value)
         if isinstance(found, str):
@@ -92,65 +92,65 @@ def path(name: str, value: object) -> str:
 
 
 def choice(name: str, value: object, known: Sequence[str]) -> None:
-    """Raise ValueError for an unknown word."""
+    """Raise ValueError for a value that is not among the known words."""
     if not (isinstance(value, str) and value in known):
-        raise ValueError(f"{name} {printable(repr(value))} is none of {', '.join(known)}")
+        raise ValueError(f"{name} {printable(repr(value))} is not one of {', '.join(known)}")
 
 
 def words(name: str, value: object, example: str) -> tuple[str, ...]:
-    """A list of words. Raises TypeError; a single word is not a list."""
+    """The value as a tuple of words. Raises TypeError, even for a single word."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
         found = tuple(value)
         if all(isinstance(word, str) for word in found):
             return found
-    raise TypeError(f"{name} is a list of names, not {kind(value)}; give [{example!r}]")
+    raise TypeError(f"{name} must be a list of names, not {kind(value)}; give [{example!r}]")
 
 
 def real(name: str, value: object, unit: str) -> float:
-    """A real number of any value, infinities and NaN included. Raises TypeError."""
+    """The value as a real number, possibly infinite or NaN. Raises TypeError."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise TypeError(f"{name} is a number of {unit}, not {kind(value)}")
+        raise TypeError(f"{name} must be a number ({unit}), not {kind(value)}")
     return float(value)
 
 
 def number(name: str, value: object, unit: str, least: float = -math.inf) -> float:
-    """A finite number, at least `least`. Raises TypeError and ValueError."""
+    """The value as a finite number of at least `least`. Raises TypeError and ValueError."""
     found = real(name, value, unit)
     if not (math.isfinite(found) and found >= least):
-        raise ValueError(f"{name} is a number of {unit}{', not negative' if least == 0 else ''}, not {found:g}")
+        raise ValueError(f"{name} must be a finite{' nonnegative' * (least == 0)} number ({unit}), not {found:g}")
     return found
 
 
 def whole(name: str, value: object, unit: str, least: int) -> int:
-    """An integer, at least `least`. Raises TypeError and ValueError."""
+    """The value as an integer of at least `least`. Raises TypeError and ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise TypeError(f"{name} is a whole number of {unit}, not {kind(value)}")
+        raise TypeError(f"{name} must be a whole number of {unit}, not {kind(value)}")
     if value < least:
-        raise ValueError(f"{name} is a whole number of {unit}, at least {least}, not {value}")
+        raise ValueError(f"{name} must be a whole number of {unit}, at least {least}, not {value}")
     return int(value)
 
 
 def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
-    """A list of finite numbers. Raises TypeError and ValueError."""
+    """The value as a tuple of finite numbers. Raises TypeError and ValueError."""
     hint = f"give a list of numbers such as {example}"
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
-        raise TypeError(f"{name} is a list of finite numbers, not {kind(value)}; {hint}")
+        raise TypeError(f"{name} must be a list of finite numbers, not {kind(value)}; {hint}")
     try:
         found = tuple(float(x) for x in value)
     except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"{name} is a list of finite numbers, but an entry is not a number; {hint}") from None
+        raise TypeError(f"{name} must be a list of finite numbers, but an entry is not a number; {hint}") from None
     if not all(map(math.isfinite, found)):
-        raise ValueError(f"{name} is a list of finite numbers, but an entry is not finite; {hint}")
+        raise ValueError(f"{name} must be a list of finite numbers, but an entry is not finite; {hint}")
     return found
 
 
 def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[str, str]:
-    """A mapping from some of `keys` to text. Raises TypeError and ValueError."""
+    """The value as a mapping from some of `keys` to text. Raises TypeError and ValueError."""
     if not isinstance(value, Mapping):
-        raise TypeError(f"{name} is a mapping of text to text, not {kind(value)}; give {example}")
+        raise TypeError(f"{name} must be a mapping of text to text, not {kind(value)}; give {example}")
     strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]
     if strange:
-        raise TypeError(f"{name} is a mapping of text to text, but it contains {kind(strange[0])}; give {example}")
+        raise TypeError(f"{name} must be a mapping of text to text, but it contains {kind(strange[0])}; give {example}")
     unknown = [key for key in value if key not in keys] if keys else []
     if unknown:
         raise ValueError(f"{name} has no {printable(unknown[0])}; its keys are {', '.join(keys)}, as in {example}")
@@ -162,12 +162,12 @@ def signal(name: str, value: object) -> NDArray[Any]:
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
-        raise ValueError(f"{name} has one number per sample, but rows of different lengths are given") from None
+        raise ValueError(f"{name} must have one number per sample, not rows of different lengths") from None
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:
             hint = "; pass its .ravel()" if 1 in found.shape else "; pass one of its columns"
-        raise ValueError(f"{name} has one number per sample, shape (N,), not shape {found.shape}{hint}")
+        raise ValueError(f"{name} must have one number per sample, shape (N,), not shape {found.shape}{hint}")
     if found.dtype.kind == "O":
         try:
             if any(x is None for x in found):
@@ -176,9 +176,9 @@ def signal(name: str, value: object) -> NDArray[Any]:
         except OverflowError:
             raise ValueError(f"{name} has a whole number beyond the range of double precision") from None
         except (TypeError, ValueError):
-            raise TypeError(f"{name} is an array of real numbers (N,), not {kind(value)}") from None
+            raise TypeError(f"{name} must be an array of real numbers (N,), not {kind(value)}") from None
     if found.dtype.kind not in "fiub":
-        raise TypeError(f"{name} is an array of real numbers (N,), not {kind(value)} of {found.dtype}")
+        raise TypeError(f"{name} must be an array of real numbers (N,), not {kind(value)} of {found.dtype}")
     return found
 
 
@@ -189,7 +189,7 @@ def samples(v: ArrayLike) -> Array:
     """Samples (N,) in double precision. Raises ValueError unless they are one-dimensional."""
     found = np.ascontiguousarray(v, dtype=np.float64)
     if found.ndim != 1:
-        raise ValueError(f"a signal has one dimension, this one has {found.ndim}")
+        raise ValueError(f"a signal must have one dimension, not {found.ndim}")
     return found
 
 
@@ -228,7 +228,7 @@ def whole_from(least: int, **values: int) -> None:
 
 
 def finite_numbers(values: Sequence[float], name: str) -> tuple[float, ...]:
-    """At least one finite number, as plain floats. Raises ValueError."""
+    """The values as plain floats: finite, and at least one. Raises ValueError."""
     try:
         found = () if isinstance(values, str) else tuple(float(x) for x in values)
     except (TypeError, ValueError, OverflowError):

@@ -1,4 +1,4 @@
-"""Output of the command line to terminals, pipes and files, and the signals that end its process."""
+"""Output of the command line to terminals, pipes and files, and handling of the signals that end its process."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class OutputError(click.ClickException):
         _discard(sys.stdout)
 
     def show(self, file: IO[str] | None = None) -> None:
-        """Print the message in the format of all other messages."""
+        """Print the message in the same format as all others."""
         note(f"error: {self.message}", file)
 
 
@@ -83,11 +83,12 @@ class Commands(click.Group):
             except OSError as failure:
                 if failure.filename:
                     raise
-                _discard(sys.stderr)  # a message of click's own could not be written
+                _discard(sys.stderr)  # one of click's own messages could not be written
                 sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; an OSError that it does not catch, and that names no file, comes from its output."""
+        """Run the command; an OSError that it does not catch and that names no file is taken to come from its
+        output."""
         with _output():
             return super().invoke(ctx)
 

@@ -1,4 +1,4 @@
-"""How a notebook shows a result: a line, a table as text and, with matplotlib, a picture."""
+"""Notebook display of results: a line, a table as text and, with matplotlib, a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all figures share: colours, labels, thinned lines, and files with reproducible bytes.
+"""The common basis of all figures: colours, labels, thinned lines, and files with reproducible bytes.
 
 matplotlib is imported only when a figure is drawn; its settings and the user's stay unchanged.
 """
@@ -59,7 +59,7 @@ BLOCKS = 1000
 """Number of blocks into which a line is divided for thinning; the extremes of each block are kept."""
 
 MOST_POINTS = 4000
-"""Lines with more points that cannot be thinned become pixels in an SVG; also the maximum number in a scatter plot."""
+"""Longer lines that cannot be thinned become pixels in an SVG; also the maximum number of points in a scatter plot."""
 
 
 KINDS = (".png", ".svg")
@@ -80,7 +80,7 @@ def check_path(path: str | os.PathLike[str]) -> None:
 
 
 def picture(draw: Callable[[], Figure], path: str | os.PathLike[str] | None = None) -> Figure:
-    """The figure that `draw` makes, in the common style; given a path, it is also saved there, all or nothing.
+    """The figure that `draw` makes, in the common style; also saved to `path`, if given, all or nothing.
 
     Raises PlotError.
     """
@@ -121,7 +121,7 @@ def _import() -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence matplotlib's message that it moves its caches because the home folder is read-only."""
+    """Silence matplotlib's message about moving its caches when the home folder is read-only."""
     logger = logging.getLogger("matplotlib")
     before = logger.level
     if before == logging.NOTSET:
@@ -154,7 +154,7 @@ def figure(width: float, height: float) -> Figure:
 def content(drawn: Figure, kind: str) -> bytes:
     """The bytes of a PNG or SVG (`kind`) of a figure, without date or version."""
     engine = drawn.get_layout_engine()
-    if engine is not None:  # savefig would draw everything twice for the layout
+    if engine is not None:  # savefig would draw everything a second time for the layout
         engine.execute(drawn)
         drawn.set_layout_engine(None)
     out = io.BytesIO()
@@ -164,12 +164,12 @@ def content(drawn: Figure, kind: str) -> bytes:
 
 
 def label(what: str, unit: str | None) -> str:
-    """`drive (V)`, or only the word if there is no unit."""
+    """An axis label such as `drive (V)`, without parentheses if there is no unit."""
     return f"{what} ({unit})" if unit else what
 
 
 def noise_lines(axes: Axes, noise: float | None) -> None:
-    """Draw the standard deviation of the noise on both sides of zero; nothing if it is unknown."""
+    """Draw lines one standard deviation of the noise above and below zero, or nothing if the noise is unknown."""
     if noise is None:
         return
     for side, name in ((noise, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-noise, None)):
@@ -177,7 +177,7 @@ def noise_lines(axes: Axes, noise: float | None) -> None:
 
 
 def legend_above(axes: Axes, columns: int = 3) -> None:
-    """Put the legend above the plot area, where it hides nothing."""
+    """Place the legend above the plot area, where it hides nothing."""
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.4,
         columnspacing=1.2,
@@ -185,7 +185,7 @@ def legend_above(axes: Axes, columns: int = 3) -> None:
 
 
 def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
-    """Indices from start to stop that draw the same lines: the extremes of every signal in each block of samples."""
+    """Indices from start to stop that suffice to draw the same lines: each block's extremes of every signal."""
     count = stop - start
     if count <= 4 * BLOCKS:
         return np.arange(start, stop)
@@ -194,7 +194,7 @@ def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
     for signal in signals:
         part = signal[start:stop]
         for sign in (1.0, -1.0):
-            # a block that is all NaN keeps its first sample
+            # a block of NaNs keeps its first sample
             values = np.where(np.isnan(part), -np.inf, sign * part)
             peak = np.maximum.reduceat(values, edges[:-1])
             at_peak = np.flatnonzero(values == np.repeat(peak, np.diff(edges)))

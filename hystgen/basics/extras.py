@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
-"""Packages of the extra `fit`, without which nothing can be fitted."""
+"""Packages of the extra `fit`, needed for every fit."""
 
 PLOT = ("matplotlib",)
 """Packages of the extra `plot`."""

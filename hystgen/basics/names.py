@@ -1,4 +1,4 @@
-"""Limits on a model's name, which is the prefix of its C, and on the length of unit names."""
+"""Limits on a model's name, the prefix of its C symbols, and on the length of unit names."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from hystgen.basics.problems import printable
 
 MAX_NAME = 40
 NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
-"""Letters, digits and single underscores between them, starting with a letter."""
+"""Letters and digits with single underscores between them, starting with a letter."""
 
 MAX_UNIT = 40
-"""[characters] Maximum length of a unit name: longer text in the header of a recording is not taken for a unit, since
-a parameter file could not hold it."""
+"""[characters] Maximum length of a unit name. A parameter file refuses longer ones, so longer text in the header of a
+recording is not taken for a unit."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -34,7 +34,7 @@ KEYWORDS = _words(
     """
 )
 
-# NAME.h may be on an include path, where it would be found in place of the system's header.
+# On an include path, NAME.h would be found instead of the system's header of that name.
 _HEADERS = _words(
     """
     aio alloca arduino assert complex cpio ctype dirent dlfcn endian errno fcntl fenv float fmtmsg fnmatch ftw
@@ -47,8 +47,8 @@ _HEADERS = _words(
 
 _DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))])
 
-# The macros UPPER_... of a model with one of these names would clash with those of a standard header. The first group
-# also rules out names that continue after an underscore, the second only the names themselves.
+# The macros UPPER_... of a model with one of these names would clash with those of a standard header. Names in the
+# first group are also forbidden with an underscore and more behind them, those in the second only as they stand.
 _MACRO_FAMILIES = dict.fromkeys(_words("dbl dec dec32 dec64 dec128 flt ldbl"), "float")
 _MACRO_NAMES = (
     dict.fromkeys(_words("ptrdiff sig_atomic size wchar wint intptr uintptr intmax uintmax"), "stdint")
@@ -60,7 +60,7 @@ _MACRO_NAMES = (
 
 
 def name_problem(name: str) -> str | None:
-    """What is wrong with a model's name, and what to do; None if it is usable.
+    """The fault of a model's name and how to fix it; None if the name is usable.
 
     A name is the prefix of every emitted symbol (`NAME_...`) and, in upper case, of every macro, and it names
     the files `NAME.h`, `NAME.c` and `NAME_selftest.h/.c`. Case is ignored in every comparison, because macros

@@ -1,7 +1,7 @@
 """The same work on several items, in forked copies of this process or in its threads.
 
-A copy (fork) starts with everything that this process had in memory, so little has to be sent. The results are those
-of a plain loop, in whatever order the processes run. Where forking is not safe, a plain loop does the work.
+A copy (fork) starts with everything that this process had in memory, so little has to be sent. The results are the same
+as from a plain loop, in whatever order the processes finish. Where forking is not safe, a plain loop does the work.
 """
 
 from __future__ import annotations
@@ -54,8 +54,7 @@ def _cores() -> int:
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and `tick` is called once for
-    each.
+    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and each item calls `tick`.
 
     An item that fails or kills its worker is rerun in this process, so an exception is raised as in a plain loop.
     """
@@ -68,14 +67,14 @@ def each(
 class _Pending(Generic[T, R]):
     item: T
     done: list[R] = field(default_factory=list)
-    """the task's result, once available"""
+    """the task's result, empty until then"""
     after: list[_Pending[T, R]] = field(default_factory=list)
 
 
 class Pool(Generic[T, R]):
     """Up to `jobs` processes for the same work on items that arrive one after the other; leaving `with` ends them.
 
-    They start when the first items arrive, with what this process has in memory then; items and results are pickled.
+    The processes start as copies of this one when the first items arrive; items and results are pickled.
     """
 
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
@@ -99,7 +98,7 @@ class Pool(Generic[T, R]):
         tick: Callable[[], None] = lambda: None,
         then: Callable[[T, R], Iterable[T]] = lambda *_: (),
     ) -> list[tuple[T, R]]:
-        """All the items with their results, in the order of a plain loop; `tick` is called once for each.
+        """Every item with its result, in the order of a plain loop; `tick` is called once for each.
 
         `then`: further items that follow from a result; they are next in line. An item that fails or kills its worker
         is rerun in this process, so an exception is raised as in a plain loop.
@@ -125,7 +124,7 @@ class Pool(Generic[T, R]):
     def _elsewhere(
         self, waiting: deque[_Pending[T, R]], finish: Callable[[_Pending[T, R], R], list[_Pending[T, R]]]
     ) -> None:
-        """Have the processes do the tasks; after a failure, tasks may remain undone."""
+        """Run the tasks in the processes; after a failure, some may remain undone."""
         from multiprocessing import connection
 
         self._gather(len(waiting))
@@ -156,11 +155,11 @@ class Pool(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Start processes up to the number of tasks, `most`, and at most `jobs`."""
+        """Start one process per task, of which there are `most`, but no more than `jobs`."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
-        # Interrupts are for this process; a copy that gets one before it ignores them would print a traceback
+        # Only this process handles interrupts; a copy that received one before ignoring them would print a traceback
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             while len(self._workers) < min(self._jobs, most):
@@ -203,9 +202,9 @@ def _serve(
 
 
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
-    """`work(item)` for all items, in threads that end with the call; only compiled work runs in parallel.
+    """Call `work(item)` for all items, in threads that end with the call; only compiled work runs in parallel.
 
-    Threads are used while cores are idle, as when the last busy worker of a pool has a long task; otherwise a loop.
+    Threads are used only while cores are idle, as when the last busy worker of a pool has a long task.
     """
     room = min(len(items), _cores() // max(1, _at_work[0]))
     if room < 2:
@@ -219,7 +218,7 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
             pass
 
 
-# Threads of the linear algebra -------------------------------------------------------------------------------
+# Linear algebra threads --------------------------------------------------------------------------------------
 
 
 def one_thread() -> contextlib.AbstractContextManager[object]:

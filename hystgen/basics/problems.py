@@ -14,7 +14,7 @@ SHOWN = 60
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with a file.
+    """A problem in a file.
 
     `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong and, after a
     semicolon, what to do; `line` and `column` count from 1, and are None for a problem without a position.
@@ -37,7 +37,7 @@ class Problem:
 
 
 class ParameterError(ValueError):
-    """A parameter file that is refused, with every problem found in it.
+    """A parameter file was refused; the error lists every problem found in it.
 
     `problems` is sorted by position; `file` is the name as the user gave it; `str()` gives one line per problem.
     """
@@ -49,14 +49,14 @@ class ParameterError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A user's text as messages quote it: at most 60 characters, unprintable ones escaped."""
+    """A user's text as messages quote it: cut to `SHOWN` characters, then unprintable ones escaped."""
     if len(text) > SHOWN:
         text = text[: SHOWN - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(value: object) -> str:
-    """How messages name a value: numbers as they are, text in quotes, lists and mappings by kind."""
+    """A value as messages name it: numbers as they are, text in quotes, lists and mappings by kind."""
     if isinstance(value, str):
         return f'the text "{printable(value)}"'
     if value is None:
@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def path_text(path: Path) -> str:
-    """How messages name a path: `model.pi.weights[2]`; keys that are not plain words are quoted."""
+    """A path as messages name it: `model.pi.weights[2]`; keys that are not plain words are quoted."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -85,7 +85,7 @@ def path_text(path: Path) -> str:
 
 
 class RecordError(ValueError):
-    """A data file that is refused, with every problem found in it.
+    """A data file was refused; the error lists every problem found in it.
 
     `problems` has one line per problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` if there is no
     line); `str()` joins them.
@@ -97,7 +97,7 @@ class RecordError(ValueError):
 
 
 class PlanError(ValueError):
-    """A plan that cannot be made, with every reason in `problems`; `str()` gives one line per problem."""
+    """A plan cannot be made, for the reasons in `problems`; `str()` gives one line per problem."""
 
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems = list(problems)
@@ -105,15 +105,15 @@ class PlanError(ValueError):
 
 
 class EffectsError(ValueError):
-    """An effect that cannot be used at all, or not with these records."""
+    """An effect cannot be used at all, or not with these records."""
 
 
 class UnsupportedEffectsError(EffectsError):
-    """Something not yet supported for a model with effects; the message names the effects."""
+    """A request is not yet supported for a model with effects; the message names the effects."""
 
 
 class NotInvertibleError(ValueError):
-    """A well-formed model whose inverse was requested and does not exist; `reasons` says why, one line each."""
+    """The requested inverse of a well-formed model does not exist; `reasons` has one line per reason."""
 
     def __init__(self, reasons: Sequence[str]) -> None:
         super().__init__("the model has no inverse: " + "; ".join(reasons))
@@ -121,7 +121,7 @@ class NotInvertibleError(ValueError):
 
 
 class FormatError(ValueError):
-    """A model whose parameters do not fit the arithmetic.
+    """The parameters of a model do not fit the arithmetic.
 
     `problems`: pairs of a path in the parameter file, or `()`, and what is wrong there; `str()` gives one line each.
     """
@@ -132,7 +132,7 @@ class FormatError(ValueError):
 
 
 class SampleWarning(UserWarning):
-    """Samples that a model limited, held or extrapolated; `str()` says how many, and what was done to them."""
+    """A model limited, held or extrapolated samples; `str()` says which of these, and how many."""
 
 
 def counted(number: int, one: str, several: str = "") -> str:
@@ -141,8 +141,8 @@ def counted(number: int, one: str, several: str = "") -> str:
 
 
 FACTOR = 10.0
-"""[times] From this value on, a share is worded as a factor: "32 times" is easier to read than "3200 %", which has more
-than a share's three digits. Only wording depends on it. Changed by:
+"""[times] Ratios from this value on are worded as factors: "32 times" is easier to read than "3200 %", which has more
+than the three digits shown. Only wording depends on it. Changed by:
 report::test_shares_of_ten_times_and_more_are_factors."""
 
 

@@ -11,11 +11,10 @@ if TYPE_CHECKING:
     from rich import progress
 
 PATIENCE = 1.0
-"""Seconds before the bar appears."""
+"""[s] Time before the bar appears."""
 
 OFTEN = 0.1
-"""Seconds between updates of the bar; `tick` draws it, since a thread for the bar would rule out forking
-(`parallel`)."""
+"""[s] Interval between updates of the bar; `tick` draws it, since a thread would rule out forking (`parallel`)."""
 
 
 class Progress:

@@ -1,8 +1,9 @@
 """Files that appear complete or not at all, and folders for work in progress.
 
-Everything is written in a staging folder next to its destination and then renamed. That folder is removed when the work
-ends, however it ends; if a process was killed, the next one that writes to the same place removes its leftovers. A lock
-in the folder, which the system releases when its process ends, tells leftovers from a folder in use.
+Everything is written to a staging folder next to its destination and then renamed. The staging folder is removed when
+the work ends, even with an error; if a process was killed, the next one that writes to the same folder removes the
+leftovers. A lock in the staging folder, which the system releases with the process, tells leftovers from a folder in
+use.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ PREFIX = ".hystgen-"
 _LOCK, _FILES = "lock", "files"
 
 _swept: set[str] = set()
-"""Folders in which this process has already looked for leftovers."""
+"""Folders that this process has already searched for leftovers."""
 
 
 @contextlib.contextmanager
@@ -42,7 +43,7 @@ def staging(around: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def temporary() -> Iterator[Path]:
-    """A new, empty folder where the system keeps temporary files, for the duration of the block. Raises OSError."""
+    """A new, empty folder for temporary files, for the duration of the block. Raises OSError."""
     try:
         around = tempfile.gettempdir()
     except FileNotFoundError:
@@ -66,11 +67,11 @@ def sweep(around: Path) -> None:
 
 
 def _remove_stale(place: Path) -> None:
-    """Remove a staging folder of this user that no process holds. Raises OSError if that cannot be determined."""
+    """Remove a staging folder of this user unless a process holds it. Raises OSError if that cannot be determined."""
     if sys.platform == "win32" or place.is_symlink() or place.stat().st_uid != os.geteuid():
         return
     if not set(os.listdir(place)) <= {_LOCK, _FILES}:
-        return  # somebody else's
+        return  # another user's
     lock = _hold(place)
     if lock is not None:
         shutil.rmtree(place, ignore_errors=True)
@@ -115,7 +116,7 @@ def _hold(place: Path) -> int | None:
 
 
 def destination(path: str | os.PathLike[str]) -> Path:
-    """The path to write for `path`: the target of a link, which need not exist. Raises OSError."""
+    """The path to which a file at `path` is written: for a link, its target, which need not exist. Raises OSError."""
     target = Path(os.path.realpath(path))
     if target.is_symlink():
         raise OSError(errno.ELOOP, "leads back to itself; choose another output", os.fspath(path))
@@ -132,7 +133,7 @@ def place_for(path: str | os.PathLike[str]) -> Path:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise the OSError that `write_atomically` would raise, as found by writing a trial file to the folder."""
+    """Raise the OSError that `write_atomically` would raise; found by writing a trial file to the folder."""
     target = place_for(path)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
@@ -164,19 +165,19 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
             (folder / target.name).write_bytes(data)
             os.replace(folder / target.name, target)
     except OSError as failure:
-        # Name the requested file, not the temporary one
+        # The message should name the requested file, not the temporary one
         raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
 
 
 def check_files(folder: Path, names: Iterable[str]) -> None:
-    """Raise the OSError that writing these files into `folder` would raise, as far as that is known beforehand."""
+    """Raise the OSError that writing these files into `folder` would raise, as far as it can be foreseen."""
     around = destination(folder) if folder.is_symlink() else folder
     while not around.exists() and around != around.parent:
         around = around.parent
     if not around.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(around))
     try_folder(around, around)
-    for name in names:  # the only thing that could stop a replacement half-way
+    for name in names:  # nothing else can stop a replacement half-way
         if (folder / name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
 
@@ -207,7 +208,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
                         os.replace(made / name, target / name)
     except OSError as failure:
         own = not failure.filename or PREFIX in str(failure.filename)
-        if own and failure.errno is not None:  # name the requested path
+        if own and failure.errno is not None:  # the message should name the requested path
             raise OSError(failure.errno, failure.strerror, str(folder)) from None
         raise
     return [folder / name for name in files]

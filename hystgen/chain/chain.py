@@ -19,11 +19,11 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 VISIT = 10.0
-"""Seconds of the linear move to each value of a history."""
+"""[s] Duration of the linear move to each value of a history."""
 
 VISIT_SAMPLES = 200
-"""Samples of that move. With a mode of 0.5 Hz, taking more changes the output after a history by at most 4e-6 of its
-range; taking only 25 changes it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
+"""[samples] Length of that move. With a mode of 0.5 Hz, more samples change the output after a history by at most 4e-6
+of its range; only 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
 """Gap between records of a session, in median steps, above which the drive is held; in shorter gaps it is linear."""
@@ -101,13 +101,13 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedR
 
 
 NO_MOVE = 1e-12
-"""[share of the largest drive] Behind an effect on the drive, a move up to this size is rounding and has no direction.
-At a resting drive, a lag of a thousand samples moves back and forth by about 1e-13, since rounding makes evenly spaced
-times differ, and with them its factors. Set by: tests/test_branches.py."""
+"""[fraction of the largest drive] Behind an effect on the drive, a move of at most this size is rounding and has no
+direction. While the drive rests, the output of a lag of a thousand samples moves back and forth by about 1e-13, since
+rounding makes evenly spaced times, and thus the lag's factors, differ. Set by: tests/test_branches.py."""
 
 
 def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """How far the signal in front of the memoryless part may move back before the branch changes, in drive units."""
+    """Largest move back of the signal in front of the memoryless part that keeps the branch, in drive units."""
     if not static.branches_differ or not any(effect.place is Place.DRIVE for effect in effects):
         return 0.0
     largest = max(abs(end) for end in static.input_range)
@@ -115,7 +115,7 @@ def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 class Ordered:
-    """Effects in the order of the chain, and what they do at each place."""
+    """Effects in the order of the chain, and their action at each place in it."""
 
     effects: tuple[Effect, ...]
 
@@ -180,7 +180,7 @@ class Ordered:
         return last.bent_sum(p, rows, thresholds)
 
     def mapped(self, h: Array, level: Array | float, run: Run) -> Array:
-        """The output after its maps: a limit before the offset `level`, a sensor after it."""
+        """The output after its maps: limits act before the offset `level` is added, sensors after."""
         for effect in self.at(Place.OUTPUT):
             if effect.order == 0:
                 h = effect.mapped(h, run)
@@ -201,8 +201,8 @@ class Ordered:
 class Chain(Ordered):
     """Static model and effects as one forward model.
 
-    Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
-    output offset, sensor nonlinearity, drift. Raises EffectsError if two effects determine how the plays move.
+    Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation, output
+    offset, sensor nonlinearity, drift. Raises EffectsError if two effects determine how the plays move.
     """
 
     def __init__(self, cascade: StaticModel, effects: Sequence[Effect]) -> None:

@@ -24,36 +24,36 @@ FOREVER = 1e15
 """[s] Time after which everything has come to rest; filters allow time steps of any length."""
 
 A_DECADE = 8
-"""Samples per decade of time with which the refinement starts."""
+"""[samples per decade of time] Initial density of samples, before refinement."""
 
 CLOSE, FINE = 0.03, 3e-4
-"""Shares of the error and of the step by which the output may deviate from a straight line between two samples."""
+"""[fractions of the error and of the step] Limits on the output's deviation from a straight line between samples."""
 
 GOLDEN = 0.381966011250105
-"""Where in an interval the output is compared with the straight line: half-way may be whole periods from both ends."""
+"""[fraction of an interval] Point compared with the straight line: the middle can be whole periods from both ends."""
 
 GRADED = 4.0
 """Largest ratio of an interval to its neighbour: an oscillation that happens to cross zero at the test point of one
 interval is found in the next."""
 
 NARROWEST = 1e-6
-"""Share of the time since the step below which no interval is split, so that the edge behind a delay stays an edge."""
+"""[fraction of the time since the step] Shorter intervals are not split: the edge behind a delay stays an edge."""
 
 MOST_SAMPLES = 2**18
 """Maximum number of samples of a response; a mode with a damping of 0.001 takes a third of it."""
 
 MOSTLY = 0.5
-"""An effect is the main reason if the response without it settles in this share of the time or less."""
+"""[fraction of the settling time] An effect is the main reason if the response without it settles within this time."""
 
 
 @dataclass(frozen=True)
 class Settling:
     """Time after a step of the drive over its whole range until the output stays close to its final value.
 
-    `within`: the tolerated error as a share of the final step of the output; `error`: the same in output units; `up`,
-    `down`: s after a step to the upper and to the lower end of the range, 0 if the output settles at once, inf if not
-    within `followed` seconds; `because`: the effect or effects that take the time; `left_out`: effects that move the
-    output independently of the drive.
+    `within`: the tolerated error as a fraction of the output's final step; `error`: the same in output units; `up`,
+    `down`: settling times in s after a step to the upper or lower end of the range, 0 if the output settles at once,
+    inf if not within `followed` s; `because`: the effects that take the time; `left_out`: effects independent of the
+    drive.
     """
 
     within: float
@@ -75,7 +75,7 @@ class Settling:
         return content | {key: content[key] if math.isfinite(content[key]) else None for key in ("up", "down")}
 
     def sentence(self, unit: str | None = None) -> str:
-        """Error, time and reason; `unit`: of the output."""
+        """A sentence with error, time and reason; `unit`: of the output."""
         close = f"within {percent(self.within, '.3g')} of a step over the drive range"
         close += f" ({self.error:.3g}{f' {unit}' if unit else ''})"
         without = f"; {' and '.join(self.left_out)} not counted" if self.left_out else ""
@@ -155,15 +155,15 @@ class _Answer:
             inner = -inner
         share = (outer - within * size) / (outer - inner)
         seconds = float(times[k] + share * (times[k + 1] - times[k]))
-        # so soon, the edge itself is still moving, or plays wait for its end
+        # this early, the edge itself is still moving, or plays are waiting for its end
         return cls(seconds if seconds > dead + 2.0 * EDGE else dead, size, HORIZON)
 
 
 def _left(chain: Chain, begin: float, end: float, within: float, dead: float) -> tuple[Array, Array, float]:
-    """Times (N,) since the step, from its arrival on; the output's distance from its final value; and the size of the
-    final step.
+    """Times (N,) since the step, from its arrival on; the output's distance from its final value; size of the final
+    step.
 
-    `dead`: s after which the step arrives.
+    `dead`: time in s until the step arrives.
 
     The chain is exact for a drive that is linear between samples, but a block behind a filter takes the filter's curved
     output as linear too. Every interval in which the output deviates from a straight line is therefore split.

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
-    """Whether the drive rises at each sample; its last direction while it rests, `ascending` before its first move."""
+    """Whether the drive rises at each sample; at rest its last direction counts, before its first move `ascending`."""
     moved = np.diff(v, prepend=v[:1])
     last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
     return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
@@ -54,7 +54,7 @@ class StaticModel:
 
     @property
     def branches_differ(self) -> bool:
-        """Whether the direction of the drive matters."""
+        """Whether a stage has different branches for rising and falling drives."""
         return any(stage.branches_differ for stage in self.stages)
 
     def front(self, v: ArrayLike, ascending: bool = True) -> Array:
@@ -89,7 +89,7 @@ class StaticModel:
 
     @property
     def stage_spans(self) -> list[tuple[float, float]]:
-        """The input range of every stage, over both branches of those before it."""
+        """The input range of every stage, over both branches of the stages before it."""
         both = zip(self.stage_ranges(True), self.stage_ranges(False), strict=True)
         return [(min(a[0], b[0]), max(a[1], b[1])) for a, b in both]
 
@@ -121,11 +121,11 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at each end of `input_range` after a move from the other end, which is never outside
-        `output_range`.
+        """The output at each end of `input_range` after a move from the other end; never outside `output_range`.
 
-        Once the drive has been at the other end, references between one of these and that end of `output_range` need a
-        drive out of range. Plays that begin at 0, as after a reset, are used if they give a narrower range.
+        Once the drive has been at one end, references between the swung output at the other end and the limit of
+        `output_range` there need a drive out of range. Plays that begin at 0, as after a reset, count if their range is
+        narrower.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
@@ -158,7 +158,7 @@ class StaticModel:
     def branch_gap(self) -> float:
         """Bound on the distance between the branches of G within `input_range`; 0 with one branch.
 
-        Both rise, so between two drives a < b they are at most L(b) - R(a) apart.
+        Both branches rise, so between two drives a < b they are at most L(b) - R(a) apart.
         """
         if not self.branches_differ:
             return 0.0

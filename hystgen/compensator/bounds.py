@@ -1,25 +1,25 @@
 """Rounding-error bounds of a compiled operator against the exact model, derived once for every model.
 
-Forward, engine `loop`: rounded thresholds, start memory and stage constants shift a play by no more than their own
-error, because a play never amplifies a difference in its input, threshold or start value (3); sums and products add
-their unit roundoffs (`LoopRoundings`).
+Forward, loop engine: rounded thresholds, start memory and stage constants shift a play by no more than their own error,
+because a play never amplifies a difference in its input, threshold or start value (3); sums and products add their unit
+roundoffs (`LoopRoundings`).
 
-Engine `corners`: an answer is computed from the corner below it, which is itself an earlier answer, so the roundings of
-up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one answer.
+Corner engine: an answer is computed from the corner below it, which is itself an earlier answer, so the roundings of up
+to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one answer.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta. This requires a solution to stop where the next play would begin to follow: on the linear piece up to that
 point, of slope P_k, an output error eta becomes eta / P_k in w; beyond it, that error in w would meet a steeper slope.
-Engine `loop` stops at the point; engine `corners` switches to the steeper piece early, by the largest rounding error.
-Neither answers a move with a move in the opposite direction, which would have the same effect on plays that follow
-after a turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays
-(the sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits act on both alike.
+The loop engine stops at that point; the corner engine switches to the steeper piece early, by the largest rounding
+error. Neither answers a move with a move in the opposite direction, which would have the same effect on plays that
+follow after a turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of
+the plays (the sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits affect both equally.
 
 With two branches, two drives can give the same output, one on each branch, and rounding decides between them if the
 reference moves by less than a rounding error. Both outputs are within the bound; the drives then differ by the gap
-between the branches, at the input of the plays now and in their memory, and the bound includes that. The first move
-starts from the drive of the start memory, G_R^-1(s_0), which may not be representable in the type. The forward operator
-knows on which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
+between the branches, which affects the present input of the plays and their memory; the bound includes this. The first
+move starts from the drive of the start memory, G_R^-1(s_0), which may not be representable in the type. The forward
+operator knows on which side of this drive every other one lies, up to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computati
 class ErrorBounds:
     """Largest differences from the exact model: `forward` in output units, `inverse` in drive units (inf: no inverse).
 
-    `rounding` is the part of `inverse` that remains when both take the same branch.
+    `rounding` is the part of `inverse` that remains when the C and the exact model take the same branch.
     """
 
     forward: float

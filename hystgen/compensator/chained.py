@@ -1,7 +1,8 @@
 """The inverse of a model with effects for a known reference, in double precision and for any sample times.
 
-The compensator keeps only the actuator's states. In each sample it solves for the drive block by block, from the output
-backwards, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
+The compensator's only memory is the states of the actuator. In each sample it solves for the drive block by block, from
+the output backwards, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of
+time.
 
 The reference is read as in the C, with the same weights for its samples, at the record's sample times. Only `quiet` and
 `max_rate` are ignored, since double precision has no codes between which a drive could dither.
@@ -34,8 +35,8 @@ ROUNDING = 1e-14
 """Relative change below which a difference counts as rounding: about a hundred roundings of 1.1e-16."""
 
 FINEST = 1e-16
-"""[share of the larger end] Interval width at which the search for an input stops: below the last bit of that end, so
-that a search that ends near 0 stops too."""
+"""[fraction of the larger end] Interval width at which the search for an input stops: below the last bit of that end,
+so that a search that ends near 0 stops too."""
 
 TURNS = 8
 """Maximum iterations per sample if the gain depends on the drive to be found. 500 jumps by a quarter of the range, with
@@ -69,7 +70,7 @@ class FrontAndPlays(Block):
         self.advance(math.inf)
 
     def advance(self, seconds: float, later: float | None = None) -> None:  # noqa: ARG002  as in every block
-        """Set how long the plays move."""
+        """Set the duration of the plays' next move."""
         self.seconds = seconds
 
     def moved(self, w: float) -> Array:
@@ -83,16 +84,17 @@ class FrontAndPlays(Block):
         return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
     def call(self, verb: str, x: float) -> float:
-        """Solve or absorb, even for `rest` and `resting`: the first move, from the start memory, is like any other."""
+        """Solve or absorb, even for `rest` and `resting`: the first move from the start memory is like any other."""
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
-        """The drive on the branch of its own move. It stays on its branch while it moves on or holds, and turns only to
-        go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
+        """The drive for output `y`, on the branch of its own move. It stays on its branch while it moves on or holds,
+        and turns only to go back by more than rounding, or by more than a lag in front misses in the first sample of
+        the turn.
 
-        A lag falls short by `theta` of the distance to the other branch. With this share as the limit, holding never
-        misses by more than an immediate turn would; with any other share the miss can reach at least `1 + theta` times
-        that of a drive that knows how far the reference will go back. `rises`: whether the drive is about to rise.
+        A lag falls short by `theta` of the distance to the other branch. With this fraction as the limit, holding never
+        misses by more than an immediate turn would; with any other fraction the miss can reach at least `1 + theta`
+        times that of a drive that knows how far the reference will go back. `rises`: whether the drive will rise.
         """
         w = self._input(y)
         if not self.static.branches_differ:
@@ -130,7 +132,7 @@ class FrontAndPlays(Block):
         before = self.total(self.moved(w))
         if y == before:
             return w
-        way = (y - before) / float(self.p[0])  # at the least slope, unless an effect bends the plays
+        way = (y - before) / float(self.p[0])  # at the smallest slope, unless an effect bends the plays
         for _ in range(64):
             far = w + way
             if (left := self.total(self.moved(far)) - y) * (before - y) <= 0.0:
@@ -159,8 +161,8 @@ class FrontAndPlays(Block):
     def _scan(self, y: float) -> float:
         """As `_input`, for plain plays: finds the linear piece of the move's curve on which the sum is `y`."""
         sign = 1.0 if y >= float(self.p @ self.plays) else -1.0
-        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # contribution of the plays above each one
-        inputs = self.plays + sign * self.r  # where each one begins to follow
+        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # of plays with larger thresholds
+        inputs = self.plays + sign * self.r  # where each play begins to follow
         levels = self.c * inputs - sign * self.q + held
         k = max(int(np.searchsorted(sign * levels, sign * y, side="right")) - 1, 0)
         w = float((y - held[k] + sign * self.q[k]) / self.c[k])
@@ -168,8 +170,8 @@ class FrontAndPlays(Block):
 
 
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
-    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects to be compensated
-    nevertheless."""
+    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects to include
+    anyway."""
     for part in PARTS:
         if (alone := part.unmeasured) and alone.key not in compensate and part.takes(effect):
             write = f"emit: {{compensation: {{compensate: [{alone.key}]}}}}"
@@ -187,9 +189,9 @@ def filter_block(effect: Effect) -> Block | None:
 class Compensator:
     """Drives for a reference; ignores the sensor's own nonlinearity, since the reference is the true displacement.
 
-    `how`: how the reference is read, in samples of the record, and which unmeasured effects are compensated: `drift`,
+    `how`: how to read the reference, in samples of the record, and which unmeasured effects to compensate: `drift`,
     which begins at t = 0, and `self_heating`. `as_emitted`: lead a lag in front of two branches however short it is, as
-    the C does because its drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    the C does because its drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError, with all reasons.
     """
 
     def __init__(self, chain: Chain, how: Compensation = STANDARD, as_emitted: bool = False) -> None:
@@ -325,7 +327,7 @@ class Compensator:
         first = found.taps.first - found.missing(how.preview)
         target = np.array(wanted)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], asked.astype(np.int8), [0]])))
-        for begin, end in edges.reshape(-1, 2):  # the reference holds before and after a record
+        for begin, end in edges.reshape(-1, 2):  # the reference is constant before and after a record
             times, values = t[begin:end], wanted[begin:end]
             target[begin:end] = sum(
                 weight * np.interp(times + (first + i) * step, times, values)
@@ -335,8 +337,8 @@ class Compensator:
         return target
 
     def reading(self, step: float) -> Read:
-        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError if no averages keep the
-        noise gain within its limit."""
+        """The way in which the reference is read at samples `step` apart. Raises UnsupportedEffectsError if no averages
+        keep the noise gain within its limit."""
         found = read(self.static, self.parts, step, self.how)
         if self.how.noise_gain is not None:
             gain = noise.largest(noise.Gain(self.static, self.parts, step, found.taps or preview.PLAIN))

@@ -30,17 +30,17 @@ def choose(
     engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool = False
 ) -> str:
     """The engine that `auto` stands for; an explicit choice is kept, but a model without plays always gets `loop`.
-    `effects`: whether the model has any; none may move or bend plays.
+    `effects`: whether the model has any; effects must not move or bend plays.
 
     `optimize` speed: fewer instructions, as a geometric mean over both cores; size: less code on both cores; auto: the
-    smaller sum of the shares of a small controller's flash and time, which breaks even at `FLASH / CYCLES`, 6.8 bytes
-    of code per instruction and sample. Instructions of both operators add up. With effects in fixed point only `speed`
-    can select `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is promised 128.
-    Raises ValueError for any other value.
+    smaller sum of the fractions of a small controller's flash and time, which breaks even at `FLASH / CYCLES`, 6.8
+    bytes of code per instruction and sample. Instructions of both operators add up. With effects in fixed point only
+    `speed` can select `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is
+    promised 128. Raises ValueError for any other value.
     """
     for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
         if value not in known:
-            raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
+            raise ValueError(f"{what} {value!r} is not one of {', '.join(known)}")
     if cascade.pi.n == 0:
         return "loop"
     if engine != "auto":
@@ -94,7 +94,7 @@ def dearest(
 
 
 def _between(measured: Mapping[int, Mapping[str, str]], n: int, core: str) -> Dearest:
-    """The figures for `n` plays, interpolated linearly between the nearest rows, or taken from the only row."""
+    """The figures for `n` plays, interpolated linearly between the nearest rows, or those of the only row."""
     rows = sorted(measured)
     above = next((at for at in rows[1:] if at >= n), rows[-1])
     below = rows[max(rows.index(above) - 1, 0)]

@@ -152,7 +152,7 @@ def decimal(x: float) -> Fraction:
 class Builder:
     """The steps of `build`, each of which uses the results of those before it.
 
-    `given`: which LSBs the user set; `beyond`: how far beyond its range the input of the plays may be requested, in
+    `given`: which LSBs the user set; `beyond`: how far beyond its range the input of the plays can be requested, in
     spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as behind a lag; `bent`:
     the most that an effect adds to a play's contribution, in units of the play's input.
     """
@@ -383,7 +383,7 @@ class Builder:
         self.bits, self.slope, self.weight, self.lift, self.bound, self.held = bits, slope, weight, lift, bound, held
         self.offset = nearest(offset * 2**bits)
         if min(weight) < 0 or (self.invertible and slope[1] < 16):
-            message = f"{pi.weights[0]:g} rounds to nothing beside the others in {self.arithmetic}"
+            message = f"{pi.weights[0]:g} is too small next to the others for {self.arithmetic}"
             raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
         self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
         self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)
@@ -397,7 +397,7 @@ class Builder:
         limits.drive_min[0], limits.drive_max[0] = self.drive
         limits.output_min[0], limits.output_max[0] = self.output
         limits.offset[0] = self.offset
-        far = 2 * max(map(abs, c.input_range))  # acts like any drive beyond the range, and is finite
+        far = 2 * max(map(abs, c.input_range))  # has the effect of any drive beyond the range, and is finite
 
         def code(v: float) -> Fraction:
             return Fraction(min(max(v, -far), far)) / self.drive_lsb
@@ -462,7 +462,7 @@ class Builder:
     def _play_errors(self) -> list[Fraction]:
         """Largest error of each play against the exact model, in physical units of w.
 
-        Plays that never move are held at their mean; in the exact model such a play may move by `span - r`.
+        Plays that never move are held at their mean; in the exact model such a play can move by `span - r`.
         """
         pi = self.cascade.pi
         front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))
@@ -492,7 +492,7 @@ class Builder:
         return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
     def drive_short(self) -> Fraction:
-        """Larger distance of the first or last drive code from its end of the range, in drive units."""
+        """Larger of the distances of the first and the last drive code from the range's ends, in drive units."""
         (first, last), (low, high) = self.drive, self.cascade.input_range
         return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
 
@@ -561,7 +561,7 @@ def upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, by branch. Raises FormatError if there are too many."""
+    """Drives at the kinks of the memoryless part, for each branch. Raises FormatError if there are too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
         if not ascending and not cascade.branches_differ:
@@ -627,8 +627,8 @@ class FixedCurve:
     """A function of integers as a piecewise polynomial; `error`: largest difference between it and the function.
 
     It interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
-    `corners`: arguments of kinks; `below`: bits of a value below a code; `edge`: how far rounding can take an argument
-    out of the domain.
+    `corners`: arguments of kinks; `below`: bits of a value below a code; `edge`: how far a rounded argument can leave
+    the domain.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
-"""Floating-point form of a model: the constants of its kernels. Those of the corner engine are computed as fractions
-and rounded once."""
+"""Floating-point form of a model: the constants of its kernels; those of the corner engine are fractions rounded
+once."""
 
 from __future__ import annotations
 
@@ -138,11 +138,11 @@ def _curve(rows: Sequence[Sequence[Fraction]], dtype: Any) -> Curve:
 def _start(
     cascade: StaticModel, curve: Curve, states: Sequence[float], inverse: bool, seen: tuple[float, float]
 ) -> Start:
-    """The memory in which play k holds `states[k]`; `curve`: of the operator; `seen`: range of the plays' input.
+    """The memory in which play k holds `states[k]`; `curve`: the operator's; `seen`: range of the plays' input.
 
     A play is entered on the side of its state on which it can begin to follow within the range, since lines from far
-    outside would lose digits. The first play that can begin on neither side belongs to the bottom, with all larger
-    thresholds.
+    outside would lose digits. The first play that can begin on neither side, and all with larger thresholds, belong to
+    the bottom.
     """
     s, dtype = _sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]
@@ -161,10 +161,10 @@ def _start(
     plays = range(1, len(held))
     risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
     top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
-    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, plus what the
-    # others hold: lines from two turning points with the same output and inputs on either side of the centre. If every
-    # play can move, any centre is right; it is the same for all start memories, so that a start is forgotten to the
-    # last bit
+    # While plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, each plus the
+    # other plays' contribution: lines from two turning points with equal outputs and with inputs on either side of a
+    # centre. If every play can move, any centre is right; the one taken is the same for all start memories, so that a
+    # start is forgotten to the last bit
     k = top - 1
     w = held[top] if top < len(held) else Fraction(min(max(0.0, seen[0]), seen[1]))
     y = s.c[k] * w + _aside(s, held)[k]
@@ -175,7 +175,7 @@ def _start(
 
 
 def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
-    """For each play, the contribution of all plays with larger thresholds to the sum."""
+    """The contribution to the sum, for each play, of all plays with larger thresholds."""
     above = [p * w for p, w in zip(s.p, held, strict=True)]
     return [*itertools.accumulate(above[:0:-1], initial=Fraction(0))][::-1]
 

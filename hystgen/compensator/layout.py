@@ -25,12 +25,12 @@ class Tables(NamedTuple):
     start: Reals  # n + 1 plays, or 1 if all start at the same value
     limits: Limits
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
-    ascending: Counts  # direction before the first move, in the same order
+    ascending: Counts  # direction before the first move, in the order of `applied`
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # index in stage_data of the stage's first number
     stage_size: Counts  # break points of a dead zone
     stage_data: Reals
-    forward: Curve  # only in the corner engine, like the next six
+    forward: Curve  # this and the next six: only in the corner engine
     inverse: Curve
     forward_first: Start
     forward_zero: Start
@@ -38,7 +38,7 @@ class Tables(NamedTuple):
     inverse_zero: Start
     begin: Reals  # input of the plays before the first move, in the order of `applied`
     engine: int
-    branches: int  # 1 if the ascending and the descending branch differ
+    branches: int  # 1 if the ascending and descending branches differ
     tanh: TanhTables
     atanh: AtanhTables
 
@@ -53,7 +53,7 @@ class Tables(NamedTuple):
         return len(self.stage_kind) > 0
 
     def new_corners(self) -> Memory:
-        """Memory for one instance in engine corners; `init` of its operations sets it."""
+        """Memory for one instance in the corner engine; its `init` operation sets the values."""
         return new_memory(len(self.threshold) - 1, self.threshold.dtype)
 
 
@@ -62,7 +62,7 @@ class FixedTables(NamedTuple):
 
     threshold: Reals
     weight: Reals
-    slope: Reals  # change of the sum per least step of the plays' input
+    slope: Reals  # change of the sum per smallest step of the plays' input
     start_level: Reals
     way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last entry is never reached
     reach: Reals  # 2 start_level: output gained by then
@@ -72,15 +72,15 @@ class FixedTables(NamedTuple):
     zero: Reals  # all plays 0
     limits: Limits
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
-    ascending: Reals  # direction before the first move, in the same order
+    ascending: Reals  # direction before the first move, in the order of `applied`
     knot: Reals  # first argument of each piece, curve after curve
-    coefficient: Reals  # of each piece, curve after curve
+    coefficient: Reals  # coefficients of each piece, curve after curve
     scale: Reals  # left shift that stretches a piece to 2^31
     first: Reals  # first piece of each curve
     pieces: Reals
     domain: Reals  # (4, 2): first and last argument of each curve
-    edge: Reals  # (4, 2): how far rounding can take an argument beyond them
-    argument: Reals  # (4, 2): least and largest argument of the envelopes themselves
+    edge: Reals  # (4, 2): largest distance of a rounded argument from that domain
+    argument: Reals  # (4, 2): smallest and largest argument of the envelopes themselves
     below: Reals  # (4,): bits of a curve's value below a code
     engine: int
     branches: int
@@ -97,7 +97,7 @@ class FixedTables(NamedTuple):
         return self.fronts > 0
 
     def new_corners(self) -> FixedMemory:
-        """Memory for one instance in engine corners; `init` of its operations sets it."""
+        """Memory for one instance in the corner engine; its `init` operation sets the values."""
         return new_fixed_memory(len(self.threshold) - 1, self.threshold.dtype)
 
 

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 
 class Engines(NamedTuple):
-    """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in engine
-    loop and in engine corners, there without and with a memoryless part."""
+    """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in the loop
+    engine and in the corner engine, the latter without and with a memoryless part."""
 
     front: ModuleType
     loop: tuple[Operations, Operations]
@@ -39,7 +39,7 @@ class Engines(NamedTuple):
 
 @functools.cache
 def _engines(fixed: bool) -> Engines:
-    """The engines of floating point, or of fixed point, which are imported only when a model needs them."""
+    """The engines in floating point or in fixed point, imported only when a model needs them."""
     if not fixed:
         corners = (forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)
         return Engines(compensator, step_float.OPERATIONS, corners)
@@ -81,7 +81,7 @@ def _chain_operations(
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
-    """Memory for one instance of an operator; `init` of its operations sets it."""
+    """Memory for one instance of an operator; its `init` operation sets the values."""
     if not isinstance(t, Tables | FixedTables):
         from hystgen.compensator.chain import step as chain_step
 
@@ -148,7 +148,7 @@ class Session:
             if problems:
                 raise NotInvertibleError(problems)
         limited = clamp or arithmetic is not None
-        if engine == "corners" and min(cascade.pi.weights) < 0:  # corners need an output that rises with the drive
+        if engine == "corners" and min(cascade.pi.weights) < 0:  # its output must rise with the drive
             engine = "loop"
         self._build = functools.partial(
             tables.build, cascade, arithmetic or "float64", engine, limited, lsb, self.inverse
@@ -162,7 +162,7 @@ class Session:
 
     def init(self) -> None:
         """Return to the start memory."""
-        with jit.plain():  # one pass over the plays is not worth compiling
+        with jit.plain():  # a single pass over the plays is not worth compiling
             self._code.init(self.tables, self.state)
 
     @property
@@ -187,8 +187,8 @@ class Session:
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
-        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for other shapes,
-        TypeError for anything but an array of numbers.
+        Fixed point takes and returns codes. Raises ValueError for numbers that are not codes and for arrays of another
+        shape, TypeError for anything but an array of numbers.
         """
         samples = self._samples(x)
         return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)
@@ -197,8 +197,7 @@ class Session:
         return samples(self.tables, arguments.signal("u" if self.inverse else "v", x))
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
-        """Run a sequence of init, reset, step and commit with their arguments. Returns the steps' answers and the
-        status bits."""
+        """Run a sequence of init, reset, step and commit with arguments; returns the steps' answers and status bits."""
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
         with jit.for_samples(self._code.run, x):

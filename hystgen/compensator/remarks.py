@@ -14,9 +14,9 @@ from hystgen.compensator.reference import Session
 from hystgen.plays import slots
 
 ROUNDED = 1e-9
-"""[share of the range] A reference or drive beyond its range by at most this counts as at its end, because rounding
+"""[fraction of the range] A reference or drive beyond its range by at most this much is not counted, since rounding
 explains it: a 29-bit converter has larger steps, and in double precision a model undoes its inverse to within 1e-12.
-Affects only the counts. Set by: tests/test_clamped_inverse.py."""
+Set by: tests/test_clamped_inverse.py."""
 
 
 def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, held: int = 0) -> list[str]:
@@ -30,8 +30,7 @@ def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, he
 
 
 def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
-    """Remarks on an inverse: how many references were limited or held, and how many drives for other references were
-    limited."""
+    """Remarks on an inverse: numbers of references limited or held, and of drives limited for other references."""
     said = []
     if references:
         lie, were = ("lies", "was") if references == 1 else ("lie", "were")

@@ -1,9 +1,9 @@
 """One step, and the operations around it: commit, reset, init. All chains share `operations_of`; `made_of` makes the
-chain without blocks (engine loop, no effects), and `hystgen.compensator.chain` has chains with blocks.
+chain without blocks (loop engine, no effects), and `hystgen.compensator.chain` has chains with blocks.
 
 Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share begin with
-`operator_` there (`hystgen_operator_begin`; emission writes one for each) and have no prefix here (`begin`). Engine
-corners without effects has its own functions in `hystgen.compensator.corners` and shares only the memoryless part and
+`operator_` there (`hystgen_operator_begin`; emission writes one for each) and have no prefix here (`begin`). The corner
+engine without effects has its own functions in `hystgen.compensator.corners` and shares only the memoryless part and
 the tables.
 """
 
@@ -162,7 +162,7 @@ def plays_of(front_forward: Answer, front_inverse: LimitedAnswer, output: Answer
 
     @jit
     def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
         loop_rest(s, t.limits.zero[0])
         begin(t, s, 2 * inverse + 1)
 
@@ -198,17 +198,17 @@ class Hooks(NamedTuple):
     finite: Check
     absorb: Action
     shown: LimitedAnswer  # the present output, and status bits
-    unread: Action  # note that a reference is not finite
+    unread: Action  # record that a reference is not finite
     held: Answer  # the drive for such a reference
     stands: Check  # whether the last answer holds for a reference
-    sought: Answer  # the drive for a limited reference, which may lie beyond its range; sets BITS
+    sought: Answer  # the drive for a limited reference, possibly out of range; sets `bits`
     other: Answer  # a call that models without effects do not have
 
 
 def run_of(
     init: Action, reset: Action, step: Answer, commit: Action, plays: Callable[..., Stepping], other: Answer
 ) -> Action:
-    """`Operations.run` of any engine."""
+    """`Operations.run` for any engine."""
 
     @jit
     def run(t: Limited, s: object, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
@@ -237,7 +237,7 @@ def run_of(
 
 
 def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forward_commit) -> Operations:
-    """The operations of one operator in engine corners without effects, where the plays' memory is the whole memory;
+    """The operations of one operator in the corner engine without effects, where the plays' memory is the whole memory;
     `begin` sets the start memory of the parameter file (0), or all plays to 0 (1)."""
 
     @jit(inline=True)
@@ -247,7 +247,7 @@ def corners_of(begin: Action, visit: Action, step: Answer, commit: Action = forw
 
     @jit(inline=True)
     def reset(t: Limited, m: Stepping) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
         begin(t, m, 1)
 
     @jit(inline=True)
@@ -398,7 +398,7 @@ def made_of(
 
         @jit(inline=True)
         def reset(t: Tables | FixedTables, s: State) -> None:
-            """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+            """Set all plays to 0 and clear the status; the caller then makes the reset's step."""
             plays_reset(t, s, inverse)
 
         return operations_of(inverse, init, reset, visit, hooks)

@@ -1,4 +1,4 @@
-"""The parts of a step of engine loop that are specific to fixed point."""
+"""The parts of the loop engine's step that are specific to fixed point."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Emission: a model's numbers, in an arithmetic, as C text in files."""
+"""Emission: writes a model's numbers in one arithmetic as C text in files."""

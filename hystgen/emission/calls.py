@@ -1,4 +1,4 @@
-"""The calls for emission: they turn models into C files in a folder, or report how the files there differ."""
+"""The public calls for emission: they write models as C files into a folder, or report how the files there differ."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def emitted_model(model: Model, options: Options) -> Model:
 def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     """Names and text of the C files of one or several models; options as for `emit`. Nothing is written.
 
-    Raises whatever `emit` raises, and ValueError if two models make files of the same name.
+    Raises the same errors as `emit`, and ValueError if two models make files of the same name.
     """
     models = _models(source)
     check_names(models)
@@ -107,8 +107,8 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """Possible faults of an inverse: the diagnosis could not separate the stage from its sensor, or the drive may not
-    come to rest."""
+    """Possible faults of an inverse: the diagnosis cannot separate stage and sensor, or the drive may not come to
+    rest."""
     advice = "Record wide and nested loops, or use another sensor, and diagnose again"
     present = {*(effect.name for effect in model.effects), *["asymmetry"] * bool(model.cascade.stages)}
     found = []
@@ -126,7 +126,7 @@ def doubts(model: Model) -> list[str]:
 
 
 def _swing(model: Model) -> float:
-    """How far the drive of a model with effects may swing at rest, in drive units."""
+    """Amplitude by which the drive of a model with effects can swing at rest, in drive units."""
     from hystgen.compensator.chain.bounds import swing
     from hystgen.compensator.chain.parts import Parts
 

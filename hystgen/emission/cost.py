@@ -1,4 +1,4 @@
-"""The cost of an emitted model, derived from the model alone, so it is the same wherever it is emitted."""
+"""The cost of an emitted model, derived from the model alone, so that it is the same on every machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Layout:
-    """How a target lays out data: sizes of `int` and of pointers, and whether it packs them without alignment."""
+    """The data layout of a target: sizes of `int` and of pointers, and whether data are packed without alignment."""
 
     integer: int
     pointer: int
@@ -61,7 +61,7 @@ class MemoryBytes:
 class Cost:
     """Code size of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target, and on an 8-bit AVR,
     where tables lie in RAM too (None in float64, which an AVR lacks); and for each operator the worst-case operations
-    of a step in words and the dearest sample of similar models on each core."""
+    of a step in words, and the most expensive sample of similar models on each core."""
 
     code: Mapping[str, int]
     memory: MemoryBytes
@@ -71,12 +71,12 @@ class Cost:
 
     @property
     def code_words(self) -> str:
-        """The code in words."""
+        """The code size in words."""
         small, large = (self.code[core] for core in engines.CORES)
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
     def dearest_words(self, operator: str) -> str:
-        """The dearest sample of an operator in words."""
+        """The most expensive sample of an operator in words."""
         small, large = (self.dearest[operator][core] for core in engines.CORES)
         return (
             f"{small.instructions} instructions and {small.stack} bytes of stack on a Cortex-M0+, "
@@ -162,23 +162,22 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
 
 
 def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, whose numbers take `real` each, and of the instance that its operators use in
-    turn."""
+    """Bytes of a self-test's samples, with `real` bytes per number, and of the instance that its operators share."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
     return samples * sample, max(size for _, size in memory.instances)
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to those
-    of a search that bisects its whole list.
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to a
+    search that bisects its whole list.
 
     `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
     engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
     n, where engine `fast` is corners without a front; `both`: the same for corners that are solved and then follow an
-    applied drive that may differ; `solved`: multiplications per play of an inverse in engine loop; `chained`: of
-    an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind
-    a slew limit, and per halving of its search.
+    applied drive that may differ; `solved`: multiplications per play of an inverse in the loop engine; `chained`: of an
+    inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind a
+    slew limit, and per halving of its search.
     """
 
     factor: int
@@ -201,8 +200,8 @@ FLOAT = Counts(
 FIXED = Counts(
     2, " of 32 by 32 bits",
     {("forward", "loop"): (1, 11, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
-     # bisection of the corners, then of the plays in a block; clamps, rounding to a code, looking ahead
-     # the output of a corner is the sum of its parts, for the top corner and the one behind it
+     # bisection of the corners, then of the plays in a block; clamps, rounding to a code, looking ahead the output of a
+     # corner is the sum of its parts, for the top corner and the one below it
      ("forward", "corners"): (1, 15, 0, 2), ("inverse", "corners"): (5, 19, 0, 4),
      ("forward", "fast"): (1, 15, 0, 2), ("inverse", "fast"): (7, 22, 0, 4)},
     both=(7, 25, 0, 4), solved=2, chained=(4, 21, 3, 3), braked=(13, 1),
@@ -286,11 +285,11 @@ def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
 
 
 def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
-    """Operations of the plays of a model with effects in engine loop: multiplications, further ones per play,
+    """Operations of the plays of a model with effects in the loop engine: multiplications, further ones per play,
     comparisons, further ones per play, and tanh per play.
 
-    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, and each
-    try sums all of them, with the slope of the sum in floating point.
+    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, and each try
+    sums all of them; in floating point it also computes the slope of the sum.
     """
     from hystgen.effects import plays
 
@@ -331,7 +330,7 @@ QUOTIENT = (8, 17)
 
 
 def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
-    """Most tries of a search, and its multiplications and comparisons beside those of the sums."""
+    """Maximum number of tries in a search, and its multiplications and comparisons in addition to those of the sums."""
     from hystgen.effects import plays
 
     if isinstance(m, plays.FixedMovingTables):

@@ -51,7 +51,7 @@ def _too_fast(parameters: Parameters, compiled: Compiled) -> list[str]:
     if not 0.0 < scale <= seconds / FAST:
         return []
     return [
-        f"Effects are over within a sample: the slowest, {name}, takes {scale:.3g} s, and sample_time is "
+        f"Effects die out within a sample: the slowest, {name}, takes {scale:.3g} s, and sample_time is "
         f"{seconds:.3g} s, so the inverse hardly differs from one without effects; sample_time is in seconds, "
         f"{1e-6 * seconds:.3g} for {seconds:.3g} us"
     ]

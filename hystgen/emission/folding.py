@@ -63,7 +63,7 @@ class Function:
 
     @property
     def statements(self) -> str:
-        """Its body on one line, without marks of unused parameters."""
+        """The body on one line, without marks of unused parameters."""
         return " ".join(_COMMENT.sub("", _MARK.sub("", self.body)).split())
 
     def text(self) -> str:
@@ -87,8 +87,8 @@ def folded(
     functions: Iterable[Function], kernels: Iterable[Function],
     wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
-    """The functions of a model without code that does nothing. `wanted`: the names of those still called; the rest as
-    in `_Folding`."""
+    """The functions of a model without code that does nothing; `wanted`: names of those still called; others:
+    `_Folding`."""
     comments: list[str] = []
 
     def mask(found: re.Match[str]) -> str:
@@ -111,7 +111,7 @@ def folded(
 
 class _Folding:
     """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
-    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several may
+    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several can
     denote the same type here."""
 
     def __init__(
@@ -150,7 +150,7 @@ class _Folding:
                 self._change(caller, body)
 
     def _looks(self, expression: str) -> bool:
-        """Whether an expression only reads: it calls nothing that may change its arguments."""
+        """Whether an expression only reads, calling nothing that could change its arguments."""
         called = [self.functions.get(each) or self._known.get(each) for each in re.findall(r"(\w+)\(", expression)]
         given = [kind for each in called if each for kind in each.parameters]
         return None not in called and all("*" not in kind or kind.startswith("const ") for kind in given)

@@ -1,4 +1,4 @@
-"""What the files of a model say about it: the banner, the header's macros and calls, and the glossary of the C."""
+"""Descriptions in a model's files: the banner, the header's macros and calls, and the glossary of the C."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 # Banner
 
 PERIODS = (50, 200)
-"""[samples] Periods at which the header states how much a sine loses: a fast one, as long as the fastest sweep with
-stated bounds, and a slow one."""
+"""[samples] Periods of the sines whose loss the header states: a fast one, as long as the fastest sweep with stated
+bounds, and a slow one."""
 
 
 def banner(file: str, what: str, command: str, sha256: str, details: Sequence[str] = ()) -> str:
@@ -88,7 +88,8 @@ def reading(one: EmittedModel) -> list[str]:
 
 
 def _averaged(compiled: Compiled) -> list[str]:
-    """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and what they cost."""
+    """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and their
+    drawbacks."""
     from hystgen.compensator.chain.layout import LEAST_LATE
 
     found = []
@@ -118,13 +119,13 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
         return []
     most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
     return [
-        "Branches: the drive turns to the other branch only if that misses the reference by less, at first, than "
+        "Branches: the drive turns to the other branch only if that misses the reference by less initially than "
         f"staying on its own branch; this leaves an error of at most {most} at rest"
     ]
 
 
 def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
-    """When and how closely a drive is kept at rest."""
+    """A sentence on when a drive is kept at rest, and how closely."""
 
     t = compiled.tables
     if not one.variant.quiet:
@@ -133,7 +134,7 @@ def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
     kept = float(t.number.dither[0]) / 2.0 ** one.form.drive_bits(t)
     return [
         f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
-        "the drive that is needed at rest; the input of the plays is then within twice that of its target"
+        "the drive that is needed at rest; the input of the plays is then at most twice as far from its target"
     ]
 
 
@@ -278,8 +279,8 @@ def _timing(one: EmittedModel) -> list[Macro]:
     return [
         *found,
         ("PREVIEW", str(compiled.ahead), ahead),
-        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive, relative to rest"),
-        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, per second, for which the errors below hold"),
+        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest reference-to-drive gain, relative to that at rest"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "drive change per second up to which the errors below hold"),
         *one.form.code_sizes(compiled.tables),
     ]
 
@@ -310,7 +311,7 @@ ORDER = {
     "init": "before every other call; may be repeated at any time",
     "reset": _FIRST,
     "step": "after init; once every sample time, from one context",
-    "commit": "after a step and before the next one, any number of times; before the first step it gives a first drive",
+    "commit": "after a step and before the next one, any number of times; before the first step it sets a first drive",
     "status": _FIRST,
     "push": "after init and before the first step",
     "settle": _FIRST,
@@ -328,7 +329,7 @@ _FEW = "a few operations, less than a step"
 COSTS = {
     "init": "one pass over the plays",
     "reset": "that of init and of a step",
-    "commit": "a few comparisons: the next step absorbs the drive",
+    "commit": "a few comparisons; the next step absorbs the drive",
     "status": "one load and one store",
     "push": "less than a step",
     "settle": "at most that of two steps",
@@ -459,7 +460,7 @@ WORDS = (
     ("play", r"\bplays?\b",
      "holds its value until its input is a threshold away, and then follows at that distance"),
     ("move", _CORNERS,
-     "the rise or the fall of the input from one turning point to the next. Lengths are taken along the move, "
+     "the rise or the fall of the input from one turning point to the next. Lengths are measured along the move, "
      "so a falling move is a rising one with all signs changed"),
     ("corner", _CORNERS,
      "a turning point from which some plays still hold their values; corners are a stack, the newest one on top"),
@@ -468,7 +469,7 @@ WORDS = (
     ("way", _CORNERS, "distance of the input from a turning point"),
     ("reach", _CORNERS,
      "distance of the output from a turning point; a reach_t also holds inputs and drives beyond every code"),
-    ("segment", _CORNERS, "a straight piece of output over input, up to where the next play begins to follow"),
+    ("segment", _CORNERS, "a straight piece of output against input, up to where the next play begins to follow"),
     ("pass", r"\bpass\[",
      "the input at which a move has taken a whole block along: the corner is passed, and forgotten"),
     ("kink", r"\bkink\b", "a point along the move where another play begins to follow"),
@@ -476,10 +477,9 @@ WORDS = (
      "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
      "through it; solve: the input for an output now; resting: the input for an output at rest"),
     ("pending", r"\bpending\b",
-     "the last returned drive: it enters the memory only when the next call absorbs it, or the drive committed in its "
-     "place"),
+     "the last returned drive; the next call absorbs it into the memory, or the drive committed in its place"),
 )
-"""Each word, a pattern found in texts that use it, and its meaning."""
+"""Each word, a pattern that texts with this word contain, and its meaning."""
 
 
 def overview(text: str) -> str:

@@ -85,8 +85,8 @@ def _variant(
 @dataclass(frozen=True)
 class Code:
     """The C text of a model: types of its tables and of its instances (`states`), functions (`kernels`, `operators`),
-    the macros and tables that these use (`plays`: with an entry for each play; `beside`: the others), and `data`, which
-    all of it keeps in memory."""
+    the macros and tables that these use (`plays`: with an entry for each play; `beside`: the others), and `data`: all
+    that these keep in memory."""
 
     types: str
     states: str
@@ -185,7 +185,7 @@ def implementation(one: EmittedModel, code: Code) -> str:
 
 @dataclass(frozen=True)
 class Module:
-    """Everything that the files of a model contain.
+    """The contents of a model's files.
 
     `sha256`: hash of the parameters; `reading`: how the inverse of a model with effects reads the reference, one
     sentence per option; `doubts`: why the inverse may be of little use, in sentences.
@@ -205,7 +205,7 @@ class Module:
 
     @property
     def calls(self) -> Mapping[str, Sequence[str]]:
-        """By operator, the functions that it has in addition to those of every model."""
+        """For each operator, its functions beyond those that every model has."""
         return self.compensator.calls
 
 

@@ -100,7 +100,7 @@ EVERYWHERE = (
 
 IN_CODE = (
     (r"<:|:>|<%|%>|%:", "{0}, a digraph; write the character that it stands for"),
-    (r"#", f"a preprocessor line; only {INCLUDE} is allowed, before anything else"),
+    (r"#", f"a preprocessor line; only {INCLUDE} is allowed, at the top of the file"),
     (r"//", "a comment with //; write /* */"),
     (r"[\"']", "a string or a character; a block needs none"),
     (r"[$@`]", "{0} is not a character of C; leave it out"),
@@ -184,7 +184,7 @@ def _end(code: str, begin: int) -> int:
 
 
 def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
-    """Problems of a block: types and functions that are missing, wrong or too many."""
+    """Problems with a block's types and functions: missing, wrong or superfluous ones."""
     own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
     functions = {piece.name for piece in found if "typedef" not in piece.text}
@@ -207,7 +207,7 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
         for place, called in _calls(code):
             if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
                 line = text.count("\n", 0, at + place) + 1
-                yield line, f"{called} is called but not in the file; a block calls only its own functions"
+                yield line, f"{called} is called but not defined in the file; a block calls only its own functions"
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
             for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:
@@ -224,7 +224,7 @@ CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|
 
 
 def _calls(code: str) -> Iterator[tuple[int, str]]:
-    """Places and names of calls: a word in front of a parenthesis, or an expression that is itself in parentheses."""
+    """Positions and names of calls: a word in front of a parenthesis, or an expression in parentheses."""
     for found in re.finditer(r"(\w+)\s*\(", code):
         yield found.start(), found[1]
     for found in re.finditer(r"\)\s*\(", code):

@@ -31,7 +31,7 @@ WIDE = ("set_travel",)
 """Settings with more bits than a code, too many for fixed-point samples."""
 
 SHARE = 0.125
-"""[share of its span] How far the samples change a setting: little enough to keep references within reach."""
+"""[fraction of its span] Amount by which samples change a setting: small enough to keep references within reach."""
 
 
 def _fractions(length: int) -> list[float]:
@@ -85,8 +85,8 @@ def operators(one: EmittedModel) -> list[Operator]:
 
 
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
-    """An argument of a setting, in fixed point before rounding to a code; every third one exceeds the limits, if there
-    are any."""
+    """An argument of a setting, in fixed point before rounding to a code; every third exceeds the limits, if there are
+    any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 

@@ -1,5 +1,4 @@
-"""Emitted files that are out of date or that no model writes, and the commands that bring them up to date or delete
-them."""
+"""Emitted files that are out of date or that no model writes, and the commands that update or delete them."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ class Difference:
     options: Mapping[str, str]
 
     def sentence(self) -> str:
-        """The file and how it differs."""
+        """A sentence on the file and its differences."""
         return f"{self.path} {', '.join(self.reasons)}"
 
 
@@ -80,7 +79,7 @@ class Orphan:
     reason: str
 
     def sentence(self) -> str:
-        """The file and the reason."""
+        """A sentence on the file and the reason."""
         return f"{self.path} {self.reason}"
 
 
@@ -132,7 +131,7 @@ def advice(
     models: Sequence[Stale], unwritten: Sequence[Orphan], folder: str, given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
-    """Commands that resolve the differences of all models and their orphans, each with its effect.
+    """Commands that resolve all differences and orphans, each with its effect.
 
     One command writes everything as asked. For files made with other options, one command per set of options confirms
     them or writes them again with those. `given`: options of the command line; `effects`: files of a user's own

@@ -37,12 +37,11 @@ _WAYS = [
         r"(?<=\w\()|(?<=_t\))(?=[\w(-])|(?<=\w) (?=[\w*])",
     )
 ]
-"""Where a line may be broken, best places first: after commas, before ? and :, after operators, the loosest binding
-first."""
+"""Positions at which a line can be broken, best first: after commas, before ? and :, after operators, loosest first."""
 _CHOICE = ("? ", ": ")
 """Beginnings of lines whose continuation is indented further."""
 _GOOD = 7
-"""The first so many of these come before the rest; among them, the place with the fewest open parentheses wins."""
+"""The first this many of these come before the rest; among them, the position with the fewest open parentheses wins."""
 
 
 def literal(x: Number) -> str:

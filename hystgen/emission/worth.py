@@ -1,4 +1,4 @@
-"""How much an effect that is left out of the C matters."""
+"""The contribution of an effect that is left out of the C."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from hystgen.effects.base import Effect
 from hystgen.model import Model
 
 SWEEPS = 8
-"""[sweeps] Sweeps over the whole range over which an effect is measured. For effects that settle, the result is within
-2 % of that over 64 sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
+"""[sweeps] Number of sweeps over the whole range for which an effect is measured. For effects that settle, the result
+is within 2 % of that for 64 sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
 benchmarks/chosen_numbers.py sweeps."""
 
 

@@ -27,17 +27,17 @@ class Stage(Protocol):
         """The x in [low, high] at which the branch has the value y."""
 
     def image(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
-        """Least and largest value over [low, high]."""
+        """Smallest and largest value over [low, high]."""
 
     def slope_range(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
-        """Least and largest slope over [low, high]."""
+        """Smallest and largest slope over [low, high]."""
 
     def inverse_problems(self, low: float, high: float) -> list[str]:
-        """Why the stage has no inverse over [low, high]."""
+        """Reasons why the stage has no inverse over [low, high]; empty if it has one."""
 
 
 class StageTables(Protocol):
-    """Constants of the stages in floating point, as `hystgen.compensator.layout.Tables` has them."""
+    """Constants of the stages in floating point, a part of `hystgen.compensator.layout.Tables`."""
 
     @property
     def stage_kind(self) -> Counts: ...
@@ -69,7 +69,7 @@ class Polynomials(Protocol):
 
 
 class CurveTables(Polynomials, Protocol):
-    """Constants of the stages in fixed point, as `hystgen.compensator.layout.FixedTables` has them."""
+    """Constants of the stages in fixed point, a part of `hystgen.compensator.layout.FixedTables`."""
 
     @property
     def limits(self) -> Limits: ...

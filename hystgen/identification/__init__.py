@@ -201,7 +201,7 @@ def check_options(
 ) -> tuple[gpi.How, tuple[float, ...] | None]:
     """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
     arguments.choice("model", model, MODELS)
-    p0_floor = arguments.real("p0_floor", p0_floor, "the sum of weights, as a share")
+    p0_floor = arguments.real("p0_floor", p0_floor, "fraction of the sum of weights")
     how = gpi.How(_checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
     before = None if history is None else visited(history)
     if loading_curve:

@@ -1,4 +1,4 @@
-"""From plain data to checked parameters: every problem at once, each in one plain sentence and at its position.
+"""Turns plain data into checked parameters; reports every problem at once, in one plain sentence with its position.
 
 The structure is checked first (pydantic's findings, reworded), then how values fit together, in every part with a sound
 structure.
@@ -52,9 +52,9 @@ _PLACES: dict[str, type[BaseModel]] = {
     "in emit": schema.EmitDefaults,
     "in emit.compensation": schema.Compensation,
 }
-"""Where a misplaced key belongs, in words, with the keys of that place."""
+"""The place where a misplaced key belongs, in words, with that place's keys."""
 
-# How a key is written, for messages about missing keys.
+# Examples of how a key is written, for messages about missing keys.
 _WRITTEN = {
     "hystgen": "hystgen: 1",
     "name": "name: stage_x",
@@ -213,7 +213,7 @@ class _Checker:
 
     @staticmethod
     def _written(effect: type[Effect] | None, key: str) -> str:
-        """How a missing key is written."""
+        """An example of how a missing key is written."""
         if effect is None:
             return _WRITTEN.get(key, f"{key}: 0.0")
         examples = effect.model_fields[key].examples
@@ -230,7 +230,7 @@ class _Checker:
         return list(part.model_fields)
 
     def _empty_values(self) -> None:
-        """Keys without a value, which pydantic accepts if None is the default."""
+        """Report keys without a value, which pydantic accepts if None is the default."""
         todo: list[tuple[Path, object]] = [((), self.data)]
         while todo:
             path, value = todo.pop()
@@ -245,7 +245,7 @@ class _Checker:
     # How values fit together ------------------------------------------------------------------------------
 
     def fit(self) -> None:
-        """Everything that pydantic does not check, on the parts whose structure is sound."""
+        """Check what pydantic does not, in the parts whose structure is sound."""
         name = self.get("name")
         if name is not None and (problem := name_problem(name)):
             self.add(("name",), problem)

@@ -50,7 +50,7 @@ def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) 
     file = os.fspath(path)
     try:
         document = read(_text(file).removeprefix("\ufeff"))
-    except ParameterError:  # the file has gone since
+    except ParameterError:  # the file has been removed since
         return ParameterError(file, [Problem(path_text(place), message) for place, message in problems])
     found = [Problem(path_text(at), message, *(document.position(at) if at else ())) for at, message in problems]
     return ParameterError(file, found)

@@ -28,7 +28,7 @@ from hystgen.effects import Unmeasured
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-"""Limits on stages, effects, and characters of a description: more than any model needs, and checks stay fast."""
+"""Maximum numbers of stages, effects and characters of a description: more than any model needs, but quick to check."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
@@ -144,7 +144,7 @@ class PIParameters(_Part):
 
     @property
     def density_output_error(self) -> float | None:
-        """Bound of the discretised density's error on the output, any drive and history; None without a density."""
+        """Bound of the discretised density's error on the output for any drive and history; None without a density."""
         return self._density_errors[1] if self._density_errors else None
 
 
@@ -201,7 +201,7 @@ def _as_list(value: object) -> object:
 
 
 class ModelParameters(_Part):
-    """What the actuator does: a memoryless front, the Prandtl-Ishlinskii model, an offset, further effects."""
+    """The actuator's behaviour: a memoryless front, the Prandtl-Ishlinskii model, an offset, further effects."""
 
     pi: PIParameters
     memoryless: Annotated[tuple[StageParameters, ...], BeforeValidator(_as_list)] = Field(
@@ -237,7 +237,7 @@ class Compensation(_Part):
     )
     noise_gain: Positive | None = Field(
         default=None,
-        description="largest gain from reference to drive, over the static gain; averaging the reference limits it",
+        description="largest reference-to-drive gain, relative to the static one; averaging the reference limits it",
     )
     max_rate: Positive | None = Field(
         default=None, description="fastest drive that error bounds are stated for, input units per s"

@@ -32,8 +32,7 @@ from hystgen.basics.problems import Path, Problem, path_text, printable
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 16
 MAX_VALUES = 100_000
-"""Limits on a file, so that anything other than a parameter file is refused at once. A file with 4096 plays has 8200
-values."""
+"""Limits on a file: anything other than a parameter file is refused at once. A file with 4096 plays has 8200 values."""
 
 _CONSTANTS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -95,7 +94,7 @@ class _OpenNode:
 
     path: Path
     live: bool
-    """False inside an entry that will be dropped: positions there are not kept."""
+    """False inside an entry that will be dropped and whose positions are therefore not recorded."""
     entries: dict[str, object] | list[object]
     is_key: bool = False
     key: str | _Unusable | None = None
@@ -213,7 +212,7 @@ class _TreeBuilder:
         self.documents = 0
 
     def take(self, event: Event, position: Position) -> None:
-        """Take the parser's next event; raise _LimitError if the rest is to be left unread."""
+        """Take the parser's next event; raise _LimitError to leave the rest unread."""
         self.position = position
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
@@ -294,7 +293,7 @@ class _TreeBuilder:
                 self.document.keys[*path, key] = position
 
     def _put(self, value: object, path: Path) -> None:
-        """Hand a finished value to the open mapping or list, or to the document."""
+        """Add a finished value to the open mapping or list, or to the document."""
         level = self.levels[-1] if self.levels else None
         if path in self.document.poisoned:
             value = None

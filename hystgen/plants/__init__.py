@@ -1,8 +1,8 @@
 """Hysteretic plants to compensate, other than Prandtl-Ishlinskii models: for examples and tests.
 
 All of them are rate-independent, so `simulate(v)` takes only the input samples and no time: between two samples the
-input moves in a straight line, and its speed makes no difference. Every call starts again from the start state of the
-plant, and goes from there to the first sample in one move.
+input moves in a straight line, and its speed makes no difference. Every call begins at the plant's start state and
+moves from there to the first sample in one move.
 """
 
 from __future__ import annotations

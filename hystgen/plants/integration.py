@@ -15,10 +15,10 @@ from hystgen.basics.arguments import Array
 Slope = Callable[[float, float], float]
 
 RTOL = 1e-11
-"""Error allowed per step, as a share of the state."""
+"""Error allowed per step, as a fraction of the state."""
 
 ATOL = 1e-13
-"""Error allowed per step for states near zero, as a share of the state's scale."""
+"""Error allowed per step for states near zero, as a fraction of the state's scale."""
 
 MOST_STEPS = 100_000
 """Maximum number of steps between two samples; if more are needed, the state has run away."""
@@ -63,5 +63,5 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
 
 
 def _at(slope: Slope, sign: float, along: float, y: Array) -> float:
-    """Slope along a variable that always increases: only then does odeint respect tcrit and evaluate none beyond it."""
+    """Slope along a variable that always increases: only then does odeint respect tcrit and stay within the move."""
     return sign * slope(sign * along, float(y[0]))

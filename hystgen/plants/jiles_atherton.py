@@ -1,4 +1,4 @@
-"""Jiles-Atherton: magnetization of a ferromagnet over the field."""
+"""Jiles-Atherton: magnetization of a ferromagnet as a function of the field."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def langevin_slope(x: float) -> float:
 
 @dataclass(frozen=True)
 class JilesAtherton:
-    """Magnetization M over the field H, with `H_e = H + alpha M` and `M_an = M_s (coth(H_e/a) - a/H_e)`.
+    """Magnetization M as a function of the field H, with `H_e = H + alpha M` and `M_an = M_s (coth(H_e/a) - a/H_e)`.
 
     `dM/dH = (1 - c) dM_irr/dH + c dM_an/dH`, `dM_irr/dH = (M_an - M_irr) / (k sgn(dH) - alpha (M_an - M_irr))`,
     `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1

@@ -333,7 +333,7 @@ class Density:
                 what = f"two of {n} thresholds coincide at r = {_short(threshold)}"
                 raise DensityError(self._part, f"{what}; take fewer, or a wider density")
             start, mass, moment = end, mass_end, moment_end
-        # Polynomials that differ from the formula, cells set to zero, weights and thresholds rounded to double.
+        # Further errors: polynomials that differ from the formula, cells set to zero, weights and thresholds in double.
         margin = 2 * ((n + 2) * self._noise + 2.0**-52 * self._total) * self.r_max
         errors = (
             0.0 if self._total == 0 else math.nextafter(float(bound + margin), math.inf) for bound in (worst, total)

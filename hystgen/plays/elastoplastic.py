@@ -45,7 +45,8 @@ def _check(modulus: float, yield_stress: float) -> None:
 
 
 def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
-    """Spring and slider in parallel under a given stress (7)-(11); `strain`: of both, before the first sample.
+    """Spring and slider in parallel under a given stress (7)-(11); `strain`: their common strain before the first
+    sample.
 
     `stress`: N samples in the unit of `yield_stress`, which is the unit of `modulus` times `strain`. The strain is
     `play_r[stress] / E` (12), with the play started at `E strain`. Raises ValueError for a modulus that is not

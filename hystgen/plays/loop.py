@@ -1,4 +1,4 @@
-"""The plays of engine loop, which moves every play in every sample: floating point, and parts shared by fixed point.
+"""The plays of the loop engine, which moves each play in each sample: floating point, and parts shared by fixed point.
 
 Functions that also exist in C have the same names here as in `c_runtime/`, and the same operations in the same order
 and arithmetic, so that results can be compared bit for bit. They do not depend on numpy's or numba's types: they run as
@@ -37,7 +37,7 @@ class LoopTables(PlayTables, Protocol):
 
 
 class State(NamedTuple):
-    """One instance."""
+    """The memory of one instance."""
 
     step: StepState
     play: Reals

@@ -22,7 +22,7 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
-# the bits that identify a call, and a bit that leaves its status for a later call to read together with its own
+# the bits that identify a call, and a bit that leaves the call's status for a later call to read with its own
 OP_CALL, OP_UNREAD = 127, 128
 
 
@@ -61,15 +61,15 @@ class StepState(Struct):
     """The memory of one operator apart from its plays; each engine uses a part of it."""
 
     pending: Real  # drive sent but not yet part of the memory
-    drive: Real  # seen last
+    drive: Real  # last drive seen
     undo_drive: Real  # `drive` before the last step
     before: Real  # input of the plays before the last step
-    returned: Real  # by the last step, if another drive has been committed since
-    reference: Real  # of the last step
+    returned: Real  # the last step's drive, if another has been committed since
+    reference: Real  # reference of the last step
     last: Real  # `reference`, limited: the next reference rises or falls from here
     next: Real  # input or output at which another play begins to follow
     level: Real  # sum of the plays
-    answer: Real  # returned last
+    answer: Real  # last number returned
     ascending: Flag  # direction of the drive's last move
     undo_ascending: Flag
     has_pending: Flag

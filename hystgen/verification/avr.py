@@ -19,7 +19,7 @@ from hystgen.verification.targets import Board
 SECONDS = 120
 HERTZ = "16000000"  # simavr needs a clock; the firmware does not
 REPORT = "selftest returned"
-STACK = 512  # bytes for stack and serial port of the firmware; in full RAM, two branches in q31 failed below 264
+STACK = 512  # bytes for the firmware's stack and serial port; with RAM full, two branches in q31 failed below 264
 CONSTANTS = (".data", ".rodata")  # both are in RAM, and their initial values in flash
 
 

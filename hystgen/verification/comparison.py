@@ -1,4 +1,4 @@
-"""The records for verification, with the output of the bit reference, and how compiled output differs from it."""
+"""Verification records with the output of the bit reference, and the comparison of compiled output with it."""
 
 from __future__ import annotations
 

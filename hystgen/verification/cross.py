@@ -56,8 +56,8 @@ class CrossCompiler:
     ) -> Path:
         """Compile and link a flat image in `folder`, which must be new. Raises CompileError.
 
-        The emitted files must compile with the host's warning flags and no warning; `more`, which is never shipped,
-        need not.
+        The emitted files must compile with the host's warning flags and no warning; `more` is never shipped and need
+        not.
         """
         folder.mkdir(parents=True)
         common = [*self.flags, *flags, *FREESTANDING]

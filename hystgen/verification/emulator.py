@@ -158,7 +158,7 @@ class Core:
 
     @property
     def stack(self) -> int:
-        """Bytes that the deepest call used below the harness's frame, by where the painted stack was overwritten."""
+        """Bytes that the deepest call used below the harness's frame, as far as the painted stack was overwritten."""
         painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
         untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
         return self._stack_at_step - (self._top - STACK + untouched)

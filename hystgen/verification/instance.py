@@ -22,7 +22,7 @@ class CompiledInstance:
 
     def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:
         if compiler is not None and compiler not in compilers.NAMES:
-            raise ValueError(f"compiler {compiler!r} is none of {', '.join(compilers.NAMES)}")
+            raise ValueError(f"compiler {compiler!r} is not one of {', '.join(compilers.NAMES)}")
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
         if chosen is None:
             raise compilers.missing(compiler) if compiler else compilers.none_found()

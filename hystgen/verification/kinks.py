@@ -1,4 +1,4 @@
-"""Calls that lead from one kink of a model to the next, where searches and roundings are most easily wrong."""
+"""Calls that lead from one kink of a model to the next; searches and roundings are most error-prone at kinks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POINTS = 2000
 FOLLOWS, TURNS, LIMIT, ANY = range(4)
 SHARES = (0.6, 0.1, 0.2, 0.1)
 
-# Share of the inverse's points after which a drive is committed, and share of these with the point's own drive
+# Fraction of the inverse's points after which a drive is committed, and fraction of these with the point's own drive
 COMMITTED, THERE = 0.6, 0.7
 
 
@@ -70,7 +70,8 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path of kinks, each met to within one last bit, for the current memory and for that of init and reset."""
+    """A path through kinks, each reached to within one last bit, of the current memory and of that of init and
+    reset."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits.drives)
     memory = _Textbook(tables)
@@ -115,10 +116,10 @@ def along(
 ) -> tuple[Bytes, NDArray[np.float64]]:
     """Operations and arguments that follow a path repeatedly, each time with different last bits.
 
-    Some points are approached to within one or more last bits, from the side of the move, and passed; some are
-    requested again, or followed by a value beyond a limit. For the inverse, the references are the outputs along the
-    path, and usually the drive of a point is committed, so that its memory stays on the path. Between init and the
-    first sample there may be a commit and one of the `special` values. `least(x)`: smallest step of the type at x.
+    Points are approached and passed in steps of one or more last bits, in the direction of the move; some are requested
+    again, or followed by a value far beyond. For the inverse, the references are the outputs along the path, and
+    usually the drive of a point is committed, so that its memory stays on the path. Between init and the first sample
+    there can be a commit and one of the `special` values. `least(x)`: smallest step of the type at x.
     """
     argument = path.output if inverse else path.drive
     span, room = float(np.ptp(argument)), float(np.ptp(path.drive))

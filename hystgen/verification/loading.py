@@ -1,4 +1,4 @@
-"""Loading a freshly built shared library, even if temporary files may not be executed."""
+"""Loads a freshly built shared library, even if temporary files cannot be executed."""
 
 from __future__ import annotations
 

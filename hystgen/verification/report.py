@@ -21,8 +21,7 @@ class Row:
     code and constants of the emitted module, `library` the bytes of library code linked to it (soft float, and anything
     else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call used below the
     caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an instance of
-    each operator. `note`: a remark on the figures. `missing`: nothing was compared, because a tool cannot be used on
-    this machine.
+    each operator. `note`: a remark on the figures. `missing`: nothing was compared because a tool cannot be used here.
     """
 
     target: str

@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of this many calls, one of these shares of the calls leaves the status unread
+# In each part of this many calls, one of these fractions of the calls leaves the status unread
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
@@ -84,7 +84,7 @@ def _coincidences(
 
 
 def _bends(tables: Tables | FixedTables) -> NDArray[np.float64]:
-    """Drives at which another piece of the memoryless part begins."""
+    """Drives at the boundaries between pieces of the memoryless part."""
     if not isinstance(tables, FixedTables):
         bent = len(tables.stage_kind) > 0 and tables.stage_kind[0] == slots.DEAD_ZONE
         return np.array(tables.stage_data[: tables.stage_size[0] if bent else 0], dtype=float)
@@ -177,8 +177,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
     """From init to a reference, sometimes 0, held until a quiet drive stops; then a settle at that drive, often with
-    another drive committed right after it, and a further move. The drive at which it comes to rest shows how much of
-    the past a settle leaves."""
+    another drive committed right after it, and a further move. The drive at which it comes to rest shows what a settle
+    has left of the past."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))

@@ -44,8 +44,7 @@ def harness(
     more: Mapping[str, Sequence[str]] = MappingProxyType({}),
     arithmetic: Arithmetic = FLOAT32,
 ) -> str:
-    """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, calls that not every model
-    has."""
+    """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,

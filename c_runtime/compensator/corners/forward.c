@@ -1,4 +1,4 @@
-/* The forward operator of engine corners, with or without a memoryless part. Called by users. */
+/* The corner engine's forward operator, with or without a memoryless part. Called by users. */
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FORWARD)
 #define HYSTGEN_FORWARD
 #endif
@@ -38,7 +38,7 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v)
 #endif
 }
 
-/* The part common to init and reset. */
+/* Code shared by init and reset. */
 static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
 #ifdef HYSTGEN_FIXED
     hystgen_start(&hystgen_model_curve, &self->here, self->corner,

@@ -1,4 +1,4 @@
-/* Operators of engine corners: start memory. Called by users. */
+/* Start memory of the corner engine's operators. Called by users. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #endif

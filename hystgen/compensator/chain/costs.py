@@ -12,13 +12,12 @@ OWN = {
     "preview": "inverse", "quiet": "inverse", "slew": "", "braked": "", "tanh": "", "dead_zone": "", "relaxing": "",
     "dilated": "", "dashpot": "", "polynomial": "", "centre": "",
 }
-"""Parts of the code other than those of blocks, with the operator if only one has the part: `dilated` for all plays
-whose input is found by a search, `braked` for a block together with a slew limit, `quiet` for a drive that stands still
-at rest."""
+"""Parts of the code that belong to no block, and the operator if only one has the part. `dilated`: for all plays whose
+input is found by a search; `braked`: for a block and a slew limit; `quiet`: for a drive that stands still at rest."""
 
 PARTS = ("any", *(each for part in parts.PARTS for each in part.code), *OWN)
-"""All parts of the code: `any` (with engine corners `any_corners`) once per model with effects, every other part once
-per kind of block."""
+"""All parts of the code: `any` (`any_corners` with the corner engine) once per model with effects, every other part
+once per kind of block."""
 
 OPERATORS = {each: "forward" for part in parts.PARTS if part.forward for each in part.code} | {
     each: operator for each, operator in OWN.items() if operator

@@ -6,11 +6,11 @@ states to lower bits; a state keeps each rounding for 1/rate samples. The drive 
 sent: the plays see that rounding error, or `rate/2` codes of it behind a lag. Errors are in units of signals in front
 of the plays and in output codes behind them.
 
-A led lag misses its target by a second difference, so plays behind it see a signal other than the one solved for: their
-memories differ for two drives, and the lead amplifies that up to the range of the drive. A user's own block in front
-has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double precision
-that has seen the same drives. With a memoryless part it holds only while nothing is limited, since a lag in front of it
-cannot be led beyond the drive's range.
+A lag that is led misses its target by a second difference, so plays behind it see a signal other than the one solved
+for: their memories differ for two drives, and the lead amplifies that up to the range of the drive. A user's own block
+in front has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double
+precision that has seen the same drives. With a memoryless part it holds only while nothing is limited, since a lag in
+front of it cannot be led beyond the drive's range.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Sizes:
     """Largest magnitudes of the signals behind the plays, in output codes.
 
     Forwards: the sum of the plays, the input of each block (`given`, by part) and of each map of the output (`mapped`),
-    and the output. Backwards: the reference after the inverse of each map, the least and largest input that a curve
+    and the output. Backwards: the reference after the inverse of each map, the smallest and largest input that a curve
     returns for it (`inverted`), the target of the output side, the output asked of each block (`wanted`), and the sum
     asked of the plays.
     """
@@ -95,7 +95,7 @@ class Bounds:
     `formats`: the blocks of each part; `bends`: the curve and inverse curve of each map that has them; `ends`: range of
     the output; `slewed`: rounding error of a slew-limited drive, in drive codes; `reached`: whether the block in front
     can be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front
-    of the plays below their input; `bumps`: curves of bent plays.
+    of the plays below the last bit of their input; `bumps`: curves of bent plays.
     """
 
     static: StaticModel
@@ -149,8 +149,8 @@ class Bounds:
         return ahead_of(self.formats)
 
     def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
-        """Blocks behind the plays in the `forward` operator or in the inverse, each with its largest input and its
-        gain, if any."""
+        """Blocks behind the plays in the `forward` operator or the inverse, with their largest inputs and gains, if
+        any."""
         parts = [part.name for part in BEHIND if forward or not part.forward]
         speed = Speed(self.static.input_range, self.largest_step, self.seconds)
         lsb = float(self.inner.output_lsb)
@@ -166,8 +166,7 @@ class Bounds:
         return found
 
     def _mapped(self) -> MapErrors:
-        """Maps of the output: the slope of their inverse at its ends, and the errors of inverse and maps, in output
-        codes."""
+        """Maps of the output: slope of their inverse at its ends, and errors of inverse and maps, in output codes."""
         found = MapErrors(np.array(self.ends) - self.static.output_offset, 1.0, 0.0, 0.0)
         unit = Whole(self._signal, float(self.inner.output_lsb), self.sizes.output)
         for each, curves in zip(reversed(self.parts.maps), reversed(self.bends), strict=True):
@@ -190,7 +189,7 @@ class Bounds:
 
     @property
     def _kept(self) -> float:
-        """How far the input of the plays can be from its target while the drive stands still."""
+        """Largest distance of the plays' input from its target while the drive stands still."""
         return 2.0 * float(self.tables.number.dither[0]) if self.tables.quiet and not self.condition else 0.0
 
     @cached_property
@@ -208,8 +207,7 @@ class Bounds:
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
     def _moved(self, way: float) -> tuple[float, float]:
-        """Error of the sum of plays that an effect moves or bends, in codes, and the part of it that the inverse
-        undoes.
+        """Error, in codes, of the sum of plays that an effect moves or bends, and the part that the inverse undoes.
 
         Its causes are rounding, and contacts within a step in which the plays' input moves by `way`.
         """
@@ -236,8 +234,8 @@ class Bounds:
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
     def _dashpot(self, step: float, way: float) -> float:
-        """How far plays with a nonlinear dashpot can be from those of the model because of the table, and because a
-        slow input is treated as standing still within a step."""
+        """Largest deviation of plays with a nonlinear dashpot from the model's, caused by the table and by treating a
+        slow input as standing still within a step."""
         t = self.tables.moving
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
         return yield_error(t, self.static, self.parts.plays, self.seconds, step, way) + seen * way
@@ -253,8 +251,8 @@ class Bounds:
         return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
-        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way`: by
-        default `_way`."""
+        """Error of the plays' sum, in output codes, for an error in front of the memoryless part; `way`: default
+        `_way`."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         moved, _ = self._moved(self._way if way is None else way)
@@ -265,7 +263,7 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
-        if self._ahead and self.static.branches_differ:  # the front may settle on either branch
+        if self._ahead and self.static.branches_differ:  # the front can settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for each, size, gain in self._behind(True):
             error = error * each.one.growth + each.there(size, self._signal)
@@ -306,7 +304,7 @@ class Bounds:
         """Rounding of the plays' input as solved for, in units of signals.
 
         If signals have bits below that input, the remainder of the sum is divided by the slope of the plays that follow
-        up to the input. More plays may begin to follow within the next step of the input: the slope used is then too
+        up to the input. More plays can begin to follow within the next step of the input: the slope used is then too
         small, by a factor down to `p_0/sum p`, and any result beyond that step is cut off.
         """
         t, step = self.tables.moving, float(self.inner.step)
@@ -326,8 +324,8 @@ class Bounds:
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
-        """Error of the inverse's answer, without the part that it undoes; under a `condition` the plays are the same,
-        and the answer is off only by its own rounding."""
+        """Error of the inverse's answer, without the part that the inverse undoes; under a `condition` the plays are
+        the same, and only the answer's own rounding remains."""
         if not self.condition:
             undone = self._moved(way)[1] * float(self.inner.output_lsb)
             return self._arriving_error(way) - self._gain() * undone / self._arriving
@@ -347,7 +345,7 @@ class Bounds:
 
     def _gain(self) -> float:
         """As `_gain_at_once`, for plays that have seen only the drives of their own compensator."""
-        if self.tables.moving.moves == DILATED:  # bounds as at once; held drives may be farther apart
+        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but held drives can be farther apart
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
@@ -397,7 +395,7 @@ class Bounds:
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
-        """Error of the drive's limits because drives are whole codes, for a limited drive and the previous one."""
+        """Error of the drive's limits caused by rounding drives to codes, for a limited drive and the one before it."""
         return upward(max(self.inner.drive_short() / self.inner.drive_lsb, Fraction(2.0 * self.slewed)))
 
     def inverse(self) -> float:

@@ -237,7 +237,7 @@ class _Builder:
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent plays are linear outside
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # linear beyond the range
         return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants
@@ -249,7 +249,7 @@ class _Builder:
 
     def _moving(self, plays: FixedTables) -> FixedMovingTables:
         step = float(self.inner.step)
-        farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still return the input beyond it
+        farthest = min(self._farthest, TABLE_MAX)  # for a search, which can still return the input beyond it
         return moving.build_fixed(
             plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
@@ -305,7 +305,7 @@ class _Builder:
         return min(max_rate * self.seconds + float(self.drive_lsb) * bool(self.parts.slew), high - low)
 
     def slew(self, span: int) -> list[int]:
-        """Whole drive codes by which the drive may rise and fall in one step, then their fractions."""
+        """Largest rise and fall of the drive in one step: whole drive codes, then their fractions."""
         if not self.parts.slew:
             return [0, 0, 0, 0]
         if self._slewed > MOST_SLEWED:
@@ -377,8 +377,7 @@ class _Builder:
     def _finest(self) -> int:
         """Additional bits in front of the plays that keep rounding, amplified by the lags' lead, below half a code.
 
-        0 for models with a memoryless part or effects on plays, and if the plays' input already has bits below a drive
-        code.
+        0 for models with a memoryless part or effects on plays, or if the plays' input has bits below a drive code.
         """
         if self.static.stages or self.parts.plays or self.inner.fine:
             return 0
@@ -410,7 +409,7 @@ class _Builder:
         return MapTables(np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found)
 
     def _bend(self, wanted: Wanted) -> Bend:
-        """A curve of a map, fitted."""
+        """The fitted curve of a map."""
         function, low, high, largest = wanted
         scale = 2.0**self.bits
         drop = max(0, math.ceil(math.log2(max(-low, high) * scale)) - BEND_BITS)

@@ -42,7 +42,7 @@ from hystgen.parameters.schema import Compensation
 
 ROUNDINGS = 4.0
 """[half last bits of the largest drive] Rounding difference between the plays' input as solved for and as it arrives,
-from a lag's goal and its state. Set by: tests/test_chain.py -k stands_still."""
+caused by a lag's goal and its state. Set by: tests/test_chain.py -k stands_still."""
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
@@ -65,8 +65,8 @@ def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
 
 
 def slewed(steps: float, dtype: Any) -> float:
-    """Accumulated rounding of a slew-limited drive after this many steps, as a share of the range's end: per step, half
-    a last bit of the remainder kept with the drive and half a last bit of the rate's."""
+    """Accumulated rounding of a slew-limited drive after this many steps, as a fraction of the range's end: per step,
+    half a last bit of the remainder kept with the drive and half a last bit of the rate's."""
     u = float(np.finfo(dtype).eps) / 2
     return steps * 2.0 * u * u
 

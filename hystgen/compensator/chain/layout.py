@@ -33,22 +33,22 @@ class ChainNumbers(Struct):
     """Constants of a chain besides those of its plays and blocks."""
 
     output_offset: Real
-    farthest_offset: Real  # largest offset that may be set in addition
-    slew_rising: Real  # how far the drive may rise and fall in a step,
+    farthest_offset: Real  # largest offset that can be set in addition
+    slew_rising: Real  # largest rise of the drive in a step, and below it largest fall
     slew_falling: Real
-    slew_rising_rest: Real  # and the remainders that rounding removed from these
+    slew_rising_rest: Real  # remainders that rounding removed from these two numbers
     slew_falling_rest: Real
-    share: Real  # by which verification corrects
-    dither: Real  # how far a drive at rest dithers, as a signal in front of the plays
+    share: Real  # fraction by which verification corrects
+    dither: Real  # amplitude of a dithering drive at rest, as a signal in front of the plays
 
 
 class FixedChainNumbers(ChainNumbers):
-    """The same in fixed point. `.._bits` and `.._drop`: bits of the first number below the last bit of the second."""
+    """The numbers in fixed point. `.._bits`, `.._drop`: bits of the first quantity below the last bit of the second."""
 
     level_bits: UInt8  # a signal behind the plays, an output code
     level_drop: UInt8  # a sum of the plays, a signal behind them
-    largest_level: Int64  # sum asked of the plays
-    least_code: Int64  # of a drive before it is limited
+    largest_level: Int64  # largest sum asked of the plays
+    least_code: Int64  # smallest and largest code of a drive before limiting
     most_code: Int64
     share_bits: UInt8  # a mantissa, a code
     drive_bits: UInt8  # a signal in front of the plays, a drive code
@@ -64,10 +64,10 @@ REST_BITS = 30
 
 MOST_SLEWED = 16.0
 """[last bits of the range's end] Maximum rounding accumulated while a slew-limited drive crosses its range; slower
-rates are refused. Derived: bounds of float32 are some 100 last bits, a tenth of which the rate may use."""
+rates are refused. Derived: bounds of float32 are some 100 last bits; a tenth of that is allowed for the rate."""
 
 VERIFIED_SHARE = 0.125
-"""The share by which verification corrects: exact in every arithmetic."""
+"""Fraction by which verification corrects: exact in every arithmetic."""
 
 LEAST_LATE = 1e-6
 """[samples] Smaller delays count as 0, since mean ages are sums with rounding errors."""
@@ -105,11 +105,11 @@ class ChainTables(NamedTuple):
     floating point; in fixed point their drive may have bits below a code; `behind`: maps of the output.
     """
 
-    plays: Any  # narrowed by the two arithmetics, like the next ones
+    plays: Any  # typed in the subclasses, like the other fields of type Any
     limits: Limits
     moving: Any
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
-    counts: Counts  # of their blocks
+    counts: Counts  # number of blocks in each of these parts
     behind: Any
     tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
     number: Any
@@ -165,7 +165,7 @@ class FixedChainTables(ChainTables):
 
 
 class OwnChainTables(ChainTables):
-    """The tables of a model with a user's own effects: `own_sides`: their classes, in front of the plays and behind."""
+    """The tables of a model with a user's own effects. `own_sides`: their classes, in front of the plays and behind."""
 
     own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
 
@@ -220,7 +220,7 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """modes kept from ringing by the taps, which also have a delay and inverted modes"""
+    """modes that the taps keep from ringing, besides their delay and inverted modes"""
     codes: Codes | None = None
     """only in fixed point"""
 
@@ -252,7 +252,7 @@ class Compiled:
 
     @property
     def last(self) -> list[One]:
-        """The blocks behind `behind`, which only the forward operator has."""
+        """The blocks that follow `behind` and that only the forward operator has."""
         return [one for part in BEHIND if part.forward for one in self.ones[part.name]]
 
     @cached_property
@@ -298,7 +298,7 @@ def braked(parts: Parts, ones: Mapping[str, Sequence[Any]]) -> int:
 
 
 def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
-    """How far the drive may rise and fall in a step, in drive units; empty without a slew limit."""
+    """Largest rise and fall of the drive in a step, in drive units; empty without a slew limit."""
     if not parts.slew:
         return ()
     pairs = [(each.rate, each.falling_rate) for each in parts.slew]
@@ -331,8 +331,8 @@ def hold(rounded: N, dither: N, turning: bool) -> N:
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE in drive units per second: as requested, else a slow sweep; at most the rate of the amplifier, and
-    the rate at which own heat keeps the gain within its limits.
+    """NAME_MAX_RATE in drive units per second: as requested, else that of a slow sweep; at most the amplifier's rate,
+    and the rate up to which own heat keeps the gain within its limits.
 
     Above the slew rate the actual drive differs from the one given to the C, depending on when in a step it is reached.
     """

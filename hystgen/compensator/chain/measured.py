@@ -1,8 +1,8 @@
 """The largest error of an inverse found by a search, for models whose bound is the whole range of the drive.
 
-A led lag misses its target by a second difference, so the memory of the plays behind it differs from the one solved
-for, and no sum of roundings tells how far apart the drives of two arithmetics may get. The error found is typical for
-references like these; it is not a bound.
+A lag that is led misses its target by a second difference, so the memory of the plays behind it differs from the one
+solved for, and no sum of roundings tells how far apart the drives of two arithmetics may get. The error found is
+typical for references like these; it is not a bound.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from hystgen.effects.base import Array, Run
 from hystgen.parameters.schema import Compensation
 
 SAMPLES = 800
-"""[samples] Of each kind of reference: the error found is then at least 0.79 of that with 3000, in half a second. Set
-by: benchmarks/chosen_numbers.py samples."""
+"""[samples] Length of each kind of reference: the error found is then at least 0.79 times that with 3000, and takes
+half a second. Set by: benchmarks/chosen_numbers.py samples."""
 
 SPEEDS = (1.0, 0.3, 0.1)
-"""[shares of NAME_MAX_RATE] Slow references let roundings of a lag add up, fast ones move all plays."""
+"""[fractions of NAME_MAX_RATE] Slow references let the roundings of a lag add up, fast ones move all plays."""
 
 SAID_BY = 10.0
 """[times the error found] A larger bound is left out, since it says nothing about the errors to expect. No run sets
@@ -78,8 +78,8 @@ def _upward(x: float) -> float:
 
 
 def _legs(step: float) -> Array:
-    """Loops in shares (0 .. 1) of a range: a full loop, shrinking loops, then pseudo-random ones; `step`: share of the
-    range per sample."""
+    """Loops as fractions (0 .. 1) of a range: a full loop, shrinking loops, then pseudo-random ones; `step`: fraction
+    of the range per sample."""
     points = [0.5, 1.0, 0.0, *(0.5 + 0.5 * (-0.7) ** k for k in range(1, 8))]
     seed = 12345
     while sum(map(abs, np.diff(points))) < SAMPLES * step:
@@ -90,7 +90,7 @@ def _legs(step: float) -> Array:
 
 
 def _multisine(step: float) -> Array:
-    """Three sines in shares (0 .. 1) of a range, together moving by at most `step` of it per sample."""
+    """Three sines as fractions (0 .. 1) of a range, together moving by at most `step` of it per sample."""
     parts = ((1.0, 0.25), (math.sqrt(7.0), 0.15), (math.sqrt(31.0), 0.1))
     turn = step / sum(rate * size for rate, size in parts)
     angle = turn * np.arange(SAMPLES)

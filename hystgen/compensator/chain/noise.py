@@ -34,22 +34,22 @@ FREQUENCIES = np.append(np.geomspace(1e-10, 1e-3, 281)[:-1], np.linspace(1e-3, n
 decade below, where creep with time constants of up to 2^28 samples causes a step in the gain."""
 
 PEAK = 0.9
-"""[share of the largest value] Local maxima above this are refined: between `FREQUENCIES` a lobe can rise unseen by at
-most 8 %, `1 - cos(pi/8)`."""
+"""[fraction of the largest value] Local maxima above this are refined: between `FREQUENCIES` a lobe can rise unseen by
+at most 8 %, `1 - cos(pi/8)`."""
 
 HALVINGS = 60
-"""[steps] In the search for a frequency or a width, enough to reach the last bits of a double."""
+"""[steps] Number in a search for a frequency or a width, enough to reach the last bits of a double."""
 
 SAME = 1e-9
 """[relative] Excess over a limit that counts as rounding: responses of a thousand weights are off by about 1e-13."""
 
 SERIES = 1.1
-"""[ratio] Of successive widths in a search: below 11 samples each step adds less than one sample, while the gain takes
-two samples to fall and rise again."""
+"""[ratio] Between successive widths in a search: below 11 samples each step adds less than one sample, while the gain
+takes two samples to fall and rise again."""
 
 MOST_TIMES = 4
-"""[averages] Maximum in series. To halve the gain, one average loses least; for a twentieth of it, two, and three if a
-lag and a mode are led together; five are never best. Set by: benchmarks/chosen_numbers.py averages."""
+"""[averages] Maximum number in series. One loses least if the gain is to be halved, two if it is to fall to a
+twentieth, three if a lag and a mode are led; five are never best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Gain:
     It applies to small changes of the reference, with any number of plays following: plays that relax, or whose
     thresholds grow with the rate, follow more slowly than in the static inverse. Blocks behind a lag remember the
     signal that arrived, the one solved for minus its second difference: if F is their response, D the part of F without
-    delay, and L the share that arrives through the lag, the input solved for is `1/(D + (F - D) L)`. `taps`: preview.
+    delay, and L the fraction arriving through the lag, the input solved for is `1/(D + (F - D) L)`. `taps`: preview.
     """
 
     static: StaticModel
@@ -115,7 +115,7 @@ class Gain:
 
     @cached_property
     def _flattest(self) -> float:
-        """Least slope of the plays, bent or not."""
+        """Smallest slope of the plays, bent or not."""
         return moving.least_slope(self.static, self.parts.plays)
 
     @cached_property
@@ -213,7 +213,7 @@ class Smoothing:
         return np.asarray((np.abs(one) / self.width) ** self.times)
 
     def loss(self, period: float) -> float:
-        """Share of its amplitude lost by a sine whose period is given in samples."""
+        """Fraction of its amplitude that a sine loses; `period` in samples."""
         return 1.0 - float(self.gain(np.array([2.0 * np.pi / period]))[0])
 
     def before(self, row: Taps) -> Taps:
@@ -242,8 +242,8 @@ def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> S
 
 
 def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
-    """The averages with the least variance that meet the limit with `room` additional weights; if none do, those with
-    the least gain."""
+    """The averages of least variance that meet the limit with `room` additional weights; failing that, of least
+    gain."""
     holding, failing = [], []
     for times in range(1, MOST_TIMES + 1):
         one, most = narrowest(gain, limit, times, max(room // times - 1.0, 1.0), centred)
@@ -255,7 +255,7 @@ def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
 
 
 def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool) -> tuple[Smoothing, float]:
-    """The least width at which `times` averages meet the limit, and their gain; `widest` if no width does."""
+    """The smallest width at which `times` averages meet the limit, and their gain; `widest` if no width does."""
     near, sizes = gain.near, gain(gain.near)
 
     def holds(width: float) -> bool:
@@ -277,8 +277,8 @@ def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool
 
 
 def _bracket(holds: Callable[[float], bool], widest: float) -> tuple[float, float]:
-    """The last width in a series that misses the limit, and the next, which meets it; the widest twice if none does.
-    The gain does not always fall with the width: half the sample rate determines it first, later the lobes do."""
+    """Two successive widths, the first of which misses the limit while the second meets it; `widest` twice if none
+    does. The gain does not always fall with the width: it is set at half the sample rate first, later by the lobes."""
     low = high = 1.0
     while not holds(high):
         if high >= widest:

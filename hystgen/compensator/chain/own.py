@@ -77,7 +77,7 @@ class System:
 
     @property
     def radius(self) -> float:
-        """Spectral radius: the share of a disturbance that remains from one sample to the next in the long run."""
+        """Spectral radius: the fraction of a disturbance that remains from one sample to the next in the long run."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
 
     def states(self) -> Array:
@@ -164,12 +164,12 @@ class Linear(One):
 
     @property
     def misses(self) -> bool:
-        """Whether the signal that arrives may differ from the one solved for."""
+        """Whether the signal that arrives can differ from the one solved for."""
         return True
 
     @property
     def ringing(self) -> Array:
-        """Frequencies (k,) in rad per sample at which its inverse may ring."""
+        """Frequencies (k,) in rad per sample at which its inverse can ring."""
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
@@ -219,7 +219,7 @@ class Linear(One):
     def passed(self, error: float, own: float = 0.0) -> float:
         """Error of the input for an error of the output, and for roundings `own` of solve.
 
-        A limit may pass an input error on in part or not at all. A single state then lies between its values for these
+        A limit can pass an input error on in part or not at all. A single state then lies between its values for these
         two cases. If earlier inputs count less in an output than the present one, input errors contract. If solve
         returns the input for which absorb returns the output, an input error acts like an error of the requested
         output, scaled by the weight of the present input.
@@ -311,10 +311,10 @@ def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
     elif abs(instance.resting(settled) - 2.0) > SAME:
         yield f"resting({settled:g}) is {instance.resting(settled):g}, but rest(2) is {settled:g}; they must be inverse"
     elif one.rest <= 0.0:
-        yield f"its output at rest is {one.rest:g} times its input; the inverse needs a positive factor"
+        yield f"its output at rest is {one.rest:g} times its input, but the inverse needs a positive factor"
     elif max(one.forward.radius, one.backward.radius) >= 1.0:
         where, radius = max(("its block", one.forward.radius), ("its inverse", one.backward.radius), key=lambda e: e[1])
-        yield f"{where} keeps {radius:.6g} of a disturbance from sample to sample, but it has to decay"
+        yield f"{where} keeps {radius:.6g} of a disturbance from one sample to the next, but a disturbance must decay"
     elif effect.place is Place.DRIVE and (abs(one.rest - 1.0) > SAME or one.forward.largest > 1.0 + SAME):
         yield (
             f"in front of the plays a block must pass a drive at rest unchanged and not overshoot; this one passes "

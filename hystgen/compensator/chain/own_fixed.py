@@ -218,7 +218,7 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
     ahead = place is Place.DRIVE
 
     def format_of(one: Linear, about: FixedSurroundings, size: float, asked: float) -> Formats:
-        bits = 0 if ahead else about.bits  # of signals in front of the plays, below the given sizes
+        bits = 0 if ahead else about.bits  # sizes in front of the plays are given in units of signals
         return formats(one, size * 2.0**bits, asked * 2.0**bits, bits)
 
     def problems(effect: Effect, at: Setting) -> Iterator[str]:

@@ -39,7 +39,7 @@ MOVES: PlaysPart[Mover, Moves]
 (MOVES,) = (module.MOVES for module in _MODULES if hasattr(module, "MOVES"))
 BENDS: PlaysPart[Bent, Bending]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
-"""The effects that move plays, and that bend them."""
+"""The effects that move plays, and those that bend them."""
 
 MAPS: list[MapPart] = [module.MAPS for module in _MODULES if hasattr(module, "MAPS")]
 """Maps of the output at the very end of the chain."""
@@ -84,8 +84,7 @@ def parts_with(
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by part of the chain, each list in the order of the chain; `blocks`: by the part's
-    name."""
+    """The effects of a model by part of the chain, each list in the chain's order; `blocks`: by name of the part."""
 
     blocks: dict[str, list[Any]]
     maps: list[Map]
@@ -136,7 +135,7 @@ class Parts:
 
     @property
     def leading(self) -> list[Any]:
-        """Effects in front of the plays, whose inverse leads."""
+        """Effects in front of the plays; their inverse leads the drive."""
         return [effect for part in AHEAD for effect in self.blocks[part.name]]
 
     def behind(self, seconds: float) -> list[Any]:

@@ -1,8 +1,8 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
 A delay is compensated by linear interpolation between two samples; a mode by three samples, or by a shaper or a notch
-for steps from point to point. In series they are one row of weights, which sum to 1; without recursion they are stable
-for any parameters.
+for steps from point to point. In series they are one row of weights, which sum to 1; without recursion they are always
+stable.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ class Shaped(NamedTuple):
         return float(ages @ self.taps.weights) + own / self.seconds
 
     def missed(self, period: float) -> float:
-        """Tracking error for a sine whose period is given in samples, as a share of its amplitude."""
+        """Tracking error of a sine as a fraction of its amplitude; `period` in samples."""
         turn = 2j * math.pi / period
         ages = -(self.taps.first + np.arange(len(self.taps.weights)))
         found = complex(np.exp(-turn * ages) @ self.taps.weights)
@@ -197,7 +197,7 @@ def led(needed: Taps, samples: int | None) -> Taps:
 
 
 class PreviewLine(NamedTuple):
-    """The last samples of the reference (L,), newest last, and whether there are any yet (1,)."""
+    """The last samples of the reference (L,), newest last, and whether the line has been filled (1,)."""
 
     sample: Reals
     filled: Counts

@@ -52,8 +52,8 @@ class LogarithmicAgeing(_Ageing):
     """
 
     shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss per decade of travel")
-    loss: Number = Field(description="share lost per decade of travel", examples=[0.01])
-    travel: Positive = Field(description="travel from which decades count, input units", examples=[1.0e4])
+    loss: Number = Field(description="fraction lost per decade of travel", examples=[0.01])
+    travel: Positive = Field(description="scale of the travel D in log10(1 + D/travel), input units", examples=[1.0e4])
 
     def gain(self, run: Run) -> Array:
         """The decreasing gain."""
@@ -73,8 +73,8 @@ class LogarithmicAgeing(_Ageing):
 class ExponentialAgeing(_Ageing):
     """Gain `1 - loss (1 - exp(-D/travel))`, D the distance travelled since the start of the session."""
 
-    shape: Literal["exponential"] = Field(description="loss that comes to an end")
-    loss: Number = Field(description="share lost in the end", examples=[0.05])
+    shape: Literal["exponential"] = Field(description="loss that levels off")
+    loss: Number = Field(description="fraction lost in the end", examples=[0.05])
     travel: Positive = Field(description="travel after which 63 % is lost, input units", examples=[1.0e4])
 
     def gain(self, run: Run) -> Array:
@@ -88,14 +88,15 @@ class ExponentialAgeing(_Ageing):
 
 
 class SeveralAgeing(_Ageing):
-    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at different distances, as wear at several speeds.
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that level off at different distances, like wear at several
+    speeds.
 
-    Two losses can follow laws between the exponential and the logarithmic law, which spreads over decades of travel.
+    Two losses can follow laws between the exponential and the logarithmic one, which spreads over decades of travel.
     """
 
-    shape: Literal["exponentials"] = Field(description="losses that come to an end at several distances")
+    shape: Literal["exponentials"] = Field(description="losses that level off at several distances")
     losses: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
-        description="shares lost in the end", examples=[[0.02, 0.03]]
+        description="fractions lost in the end", examples=[[0.02, 0.03]]
     )
     travels: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)] = Field(
         description="travels after which 63 % of each is lost, input units", examples=[[1.0e3, 1.0e4]]

@@ -19,14 +19,14 @@ FASTEST = 0.01
 """[s] Motion that settles faster than this after a move is due to a lag or domain-wall friction, not creep."""
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
-"""Largest shares to try: stages creep by 1 to 2 % per decade, some by up to three times that; with few states, each
-represents up to three decades. Set by: 16 blind plants with creep (`make blind FIRST=97000`): with half the first, the
-creep of one plant is not named and two are 3 and 7 % worse; with half the second, one is 5 % worse; doubling either
-changes none by 2 %."""
+"""[fractions of the play sum, per decade and per state] Largest to try: stages creep by 1 to 2 % per decade, some by up
+to three times that; with few states, each represents up to three decades. Set by: 16 blind plants with creep (`make
+blind FIRST=97000`): with half the first, the creep of one plant is not named and two are 3 and 7 % worse; with half the
+second, one is 5 % worse; doubling either changes none by 2 %."""
 
 SHORTER = 1.0
 """[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
-by: the same plants; half of it improves one by 2 %, twice changes none."""
+by: the same plants; half of it improves one plant by 2 %, twice changes none."""
 
 SHORTEST = 0.3
 """[decades] Minimum width of such a spectrum: a factor of two, less than each of its states represents. Recorded times
@@ -46,7 +46,7 @@ def creep(
     """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
     `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): initial states of the
-    filters. Several columns, or all filters of one column, run in parallel, since a single recursion would stall on its
+    filters. Several columns, or all filters of one, run in parallel, since a single recursion would stall on its
     previous sample.
     """
     taus, rows = states.shape
@@ -92,7 +92,7 @@ class _Creep(Effect):
     shown_by: ClassVar[Mapping[str, int]] = {"holds": 1, "slow_reversals": 1, "settling": 1, "reversals": 1}
     rank: ClassVar[float] = 0
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
+    compensation: ClassVar[str] = "exact and causal: solved for the plays, with the states known"
 
 
 class ExponentialCreep(_Creep):
@@ -102,12 +102,12 @@ class ExponentialCreep(_Creep):
     compensation for piezoactuators, J. Dyn. Sys., Meas., Control 123, 2001). A record starts settled: `x_i = h`.
     """
 
-    shape: Literal["exponential"] = Field(default="exponential", description="a few states of their own")
+    shape: Literal["exponential"] = Field(default="exponential", description="a few independent states")
     time_constants: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=64)] = Field(
         description="tau_i, s", examples=[[0.1, 1.0]]
     )
     weights: Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=64)] = Field(
-        description="c_i, as many as time_constants, shares of the play sum", examples=[[0.02, 0.01]]
+        description="c_i, as many as time_constants, fractions of the play sum", examples=[[0.02, 0.01]]
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
@@ -127,7 +127,7 @@ class ExponentialCreep(_Creep):
         return _fading(run, np.array(self.time_constants))
 
     def largest(self, run: Run) -> Array:
-        """One span each: a state lags behind the play sum by at most its span."""
+        """The weights: a state lags behind the play sum by at most the sum's span."""
         return np.array(self.weights)
 
     @classmethod
@@ -171,7 +171,7 @@ class LogarithmicCreep(_Creep):
     """
 
     shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
-    per_decade: NotNegative = Field(description="g, share of the play sum per decade of time", examples=[0.015])
+    per_decade: NotNegative = Field(description="g, fraction of the play sum per decade of time", examples=[0.015])
     t0: Positive = Field(default=0.1, description="s after a step at which it has its full height")
     t_min: Positive = Field(default=1e-3, description="shortest time constant, s")
     t_max: Positive = Field(default=1e3, description="longest time constant, s")
@@ -199,7 +199,7 @@ class LogarithmicCreep(_Creep):
 
     @property
     def at_once(self) -> float:
-        """Share of a step that arrives at once, chosen so that the step reaches its full height at t_0."""
+        """Fraction of a step that arrives at once, chosen so that the step reaches its full height at t_0."""
         tau, weight = self.spectrum()
         return 1.0 - weight * float(np.sum(-np.expm1(-self.t0 / tau)))
 
@@ -213,13 +213,13 @@ class LogarithmicCreep(_Creep):
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """One decade's weight each: its states lag behind the play sum by at most its span."""
+        """The weight of a decade for each: its states lag behind the play sum by at most the sum's span."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share per decade over the whole recorded time; then, if that helps, with free ends of the spectrum."""
+        """The fraction per decade over the whole recorded time; then, if that helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays absorb

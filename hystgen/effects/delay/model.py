@@ -12,8 +12,8 @@ from hystgen.basics.quantities import NotNegative
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 
 FAR = (0.3, 0.4, 0.5, 0.55, 0.6, 0.7)
-"""Starts as shares of the longest delay: over the delay the error has several minima, no wider than half a period of
-the fastest drive that is followed."""
+"""[fractions of the longest delay] Starts: as a function of the delay the error has several minima, none wider than
+half a period of the fastest drive that the output follows."""
 
 
 class Delay(Effect):

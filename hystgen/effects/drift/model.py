@@ -33,7 +33,7 @@ class _Drift(Effect):
 class LinearDrift(_Drift):
     """Linear drift `y + rate t` over session time, whatever the drive does; zero at t = 0."""
 
-    shape: Literal["linear"] = Field(default="linear", description="the same rate all the time")
+    shape: Literal["linear"] = Field(default="linear", description="a constant rate")
 
     def added(self, run: Run) -> Array:
         """`rate t`."""
@@ -54,7 +54,7 @@ class LinearDrift(_Drift):
 class CurvedDrift(_Drift):
     """Drift at a changing rate, `y + rate t + change t^2/2`: a frame that warms up, a sensor that settles."""
 
-    shape: Literal["curved"] = Field(description="a rate that changes evenly")
+    shape: Literal["curved"] = Field(description="a linearly changing rate")
     change: Number = Field(description="of the rate, output units per s^2", examples=[1e-7])
 
     def added(self, run: Run) -> Array:

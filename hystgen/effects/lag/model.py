@@ -20,7 +20,7 @@ class Lag(Effect):
     """
 
     name: Literal["lag"] = Field(description="name of the effect")
-    time_constant: NotNegative = Field(description="tau, s; 0 is no lag", examples=[0.0125])
+    time_constant: NotNegative = Field(description="tau, s; 0 for no lag", examples=[0.0125])
 
     place: ClassVar[Place] = Place.DRIVE
     shown_by: ClassVar[Mapping[str, int]] = {

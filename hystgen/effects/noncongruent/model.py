@@ -25,12 +25,12 @@ from hystgen.effects.base import (
 )
 
 MAX_TERMS = 8
-"""Most coefficients of a play: records determine two (`CUBIC`), and powers beyond the ninth hardly differ."""
+"""Maximum number of coefficients per play: records determine two (`CUBIC`); powers beyond the ninth hardly differ."""
 
 CUBIC = "noncongruent, cubic"
 
 PLACES = 101
-"""Positions at which a starting bump is looked for: hundredths of the range."""
+"""Number of positions tried for a starting bump, hundredths of the range apart."""
 
 LEAST, MOST = -10.0, 40.0
 """[tenths] Bounds of the coefficients of play functions at the largest drive. The density is 1 where a play is at 0:
@@ -38,10 +38,10 @@ one that rises evenly from 20 to 180 % of its mean ends at 9, with a coefficient
 (noncongruent)."""
 
 LOWEST, HIGHEST = -0.8, 2.5
-"""Amplitudes of a bump from which a search starts."""
+"""Smallest and largest amplitude of a bump from which a search starts."""
 
 EVEN = 1e-6
-"""A density as far below its ends as above them, within this share, counts as a bump, not as a dip."""
+"""[relative] A density as far below its ends as above them, within this, is taken for a bump rather than a dip."""
 
 
 class _Noncongruent(Effect):
@@ -106,11 +106,11 @@ class PlayFunctions(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The same parabola for all plays; with a cubic term, which may change evenly over r; with a quartic one."""
+        """The same parabola for all plays; then a cubic term, which may vary linearly over r; then a quartic one."""
         plays = len(about.thresholds) - 1
         if plays < 1:
             return []
-        # of order one where xi is as large as the drive makes it
+        # of order one at the largest xi of the drive
         largest = max(1.0, max(map(abs, about.drive)) / about.thresholds[-1])
 
         share = np.array(about.thresholds[1:]) / about.thresholds[-1]
@@ -146,7 +146,7 @@ class LoopCentre(_Noncongruent):
 
     shape: Literal["centre"] = Field(description="Preisach density that depends on the loop's centre")
     amplitude: Annotated[Number, Field(gt=-1.0)] = Field(
-        description="A, share by which the density at `centre` is higher; above -1", examples=[0.2]
+        description="A, relative increase of the density at `centre`; above -1", examples=[0.2]
     )
     centre: Number = Field(description="centre of the bump, input units of the plays", examples=[50.0])
     width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
@@ -180,7 +180,8 @@ class LoopCentre(_Noncongruent):
             density = np.maximum(1.0 + 0.2 * cubic[0] * at / largest + 0.3 * cubic[1] * (at / largest) ** 2, 0.05)
             outside = 0.5 * float(density[0] + density[-1])
             above, below = int(np.argmax(density)), int(np.argmin(density))
-            # it may rise or fall evenly from one end to the other: rounding would then decide which is further off
+            # the density can rise or fall evenly from end to end: rounding would then decide which extreme is farther
+            # off
             k = above if density[above] - outside >= (1.0 - EVEN) * (outside - density[below]) else below
             amplitude = float(np.clip(density[k] / outside - 1.0, LOWEST, HIGHEST))
             return np.array([amplitude, k / (PLACES - 1), start])

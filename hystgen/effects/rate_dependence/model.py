@@ -37,25 +37,25 @@ LARGE, TOGETHER = 10_000, 4
 
 
 MOST_PIECES = 1000
-"""Most pieces into which a step of a nonlinear relaxation is cut."""
+"""Maximum number of pieces per step of a nonlinear relaxation."""
 
 CLOSE = 1e-7
-"""Error of a piece of a nonlinear relaxation, in largest thresholds."""
+"""[largest thresholds] Error allowed per piece of a nonlinear relaxation."""
 
 SLOW = 1.0
-"""Share of a disturbance that friction may remove in a piece by the Taylor series."""
+"""Largest fraction of a disturbance that friction removes in a piece computed by the Taylor series."""
 
 NEARLY = 0.3
-"""[share of a stretch] A stretch may change by this much in a piece that uses only the leading term of curvature."""
+"""[fraction of a stretch] Largest change of a stretch in a piece that uses only the leading term of curvature."""
 
 SLIGHT = 1e-4
-"""Share of the speed that friction may take while its effect is integrated along the unperturbed motion."""
+"""Largest fraction of the speed lost to friction for which friction is integrated along the unperturbed motion."""
 
 
 @jit
 def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
     """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
-    # Four in parallel, since each alone waits for its own previous sample
+    # Four in parallel: a single recursion would stall on its previous sample
     fours = len(r) // 4 * 4
     for i in range(0, fours, 4):
         r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
@@ -75,7 +75,7 @@ def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, o
 @jit
 def mean_decay(x: float) -> float:
     """`(1 - exp(-x))/x`."""
-    if x < 0.1:  # the series is as exact and far quicker
+    if x < 0.1:  # the series is equally exact and much faster
         return 1.0 - x * (0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))))
     return -math.expm1(-x) / x
 
@@ -130,7 +130,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
-        if fall < 0.5 * SLIGHT * speed:  # hardly anything but the speed matters
+        if fall < 0.5 * SLIGHT * speed:  # the speed dominates
             little = scale * (SLIGHT * speed * tau / scale) ** (1.0 / exponent)
             taken = min((little - e) / speed, left)
             final = e + speed * taken
@@ -191,8 +191,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
 def relaxed(
     x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
 ) -> float:
-    """State of a play that follows its input viscously, after the input has moved from `x` to `target` in the time
-    `left`.
+    """State of a viscously following play after its input has moved from `x` to `target` in the time `left`.
 
     `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
     """
@@ -204,7 +203,7 @@ def relaxed(
         side = -1.0
     if side != 0.0:
         e, left = stretch(side * (x - state) - r, side * speed, left, tau, exponent, scale)
-        if left > 0.0:  # caught up, with the input on its way back
+        if left > 0.0:  # the play has caught up, and the input is on its way back
             x = target - speed * left
             state = x - side * r
             side = 0.0
@@ -226,7 +225,7 @@ def relaxing_plays(
 ) -> None:
     """Plays of thresholds `r` that follow their input viscously, from `states`, into the rows of `out`.
 
-    In parallel, since each alone waits for its own previous sample.
+    In parallel, since a single recursion would stall on its previous sample.
     """
     for i in range(len(r)):
         states[i] = min(max(states[i], w[0] - r[i]), w[0] + r[i])
@@ -299,10 +298,10 @@ class ThresholdRate(_RateDependence):
         closing = falls > 0.0
         if not np.any(closing):
             return []
-        return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
+        return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} per second"]
 
     def time_scale(self, drive_range: float) -> float:
-        """The largest beta: the plays are as late as behind a dashpot of that time constant."""
+        """The largest beta: the plays lag as much as with a dashpot of that time constant."""
         return max(self.betas)
 
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
@@ -341,13 +340,14 @@ class ThresholdRate(_RateDependence):
 class RelaxingPlays(_RateDependence):
     """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` the part of its argument beyond +/- r.
 
-    A dashpot parallel to the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
-    nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. For straight `w` the
-    linear case is exact, including contacts within a step; the nonlinear one is within about 1e-6 of r_n per step.
+    Every play has a dashpot parallel to its dry friction; with tau = 0 it is an ordinary play. With `exponent` m the
+    dashpot is nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. For
+    straight `w` the linear case is exact, including contacts within a step; the nonlinear one is within about 1e-6 of
+    r_n per step.
     """
 
     shape: Literal["relaxation"] = Field(description="plays that follow viscously")
-    time_constant: NotNegative = Field(description="tau, s; 0 is no delay of the plays", examples=[1.0e-3])
+    time_constant: NotNegative = Field(description="tau, s; 0 for plays without delay", examples=[1.0e-3])
     exponent: Annotated[Positive, Field(ge=0.1, le=10.0)] = Field(
         default=1.0, description="m, 1 for a linear dashpot; 0.1 to 10"
     )

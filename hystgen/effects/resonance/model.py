@@ -154,7 +154,7 @@ class Resonance(_Mode):
         return by in ("shaper", "notch") and self.damping < WELL_DAMPED
 
     def corrected(self, resonance: str) -> str:
-        """By its inverse, a shaper or a notch, or not at all."""
+        """The correction: its inverse, a shaper or a notch, or none."""
         if resonance == "none":
             return "none, as emit.compensation.resonance sets"
         return f"a {resonance}, see below" if self.rings(resonance) else self.compensation
@@ -189,7 +189,7 @@ class PartMode(_Mode):
     """
 
     shape: Literal["part"] = Field(description="a mode that carries a share of the motion")
-    share: Annotated[Positive, Field(lt=1.0)] = Field(description="of the motion at rest, below 1", examples=[0.1])
+    share: Annotated[Positive, Field(lt=1.0)] = Field(description="fraction of the motion, below 1", examples=[0.1])
 
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact: solved for the input with the oscillation known"
@@ -231,11 +231,11 @@ class PartMode(_Mode):
 
 
 FIRST_SHARE = 0.1
-"""Share at which a search starts."""
+"""Value of `share` at which a search starts."""
 
 
 def _frequencies(about: About) -> tuple[float, float]:
-    """Decimal logarithms of the least and largest frequency to search."""
+    """Decimal logarithms of the lowest and highest frequency to search."""
     low = np.log10(2.0 / about.duration)
     return low, max(np.log10(1.0 / about.sample_time) - np.log10(3.0), low)
 

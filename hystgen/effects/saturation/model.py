@@ -16,13 +16,13 @@ LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
 
 
 MIDDLE = 0.5
-"""Centre at which a search starts, as a share of the output range from its lower end."""
+"""[fraction of the output range from its lower end] Centre at which a search starts."""
 
 INSIDE, GIVE = (0.03, 0.1), 0.2
-"""Stops at which a search starts: shares of the output range inside its ends, and the slope remaining beyond them."""
+"""Start of a search: distances of the stops inside the output range, as fractions of it, and the slope beyond them."""
 
 AWAY, FARTHEST = -0.3, 0.45
-"""Bounds for the distance of the stops from the ends in a search, as shares of the range: outside, where they have no
+"""[fractions of the range] Bounds on the distance of the stops from its ends in a search: outside, where they have no
 effect, and inside."""
 
 
@@ -51,7 +51,7 @@ class _Level(_Saturation):
 class TanhSaturation(_Level):
     """Smooth limit `y = centre + level tanh((h - centre)/level)` of the output, before the offset is added.
 
-    Limits that are the same in both directions lie around the middle of the stage's travel, where the output of a
+    Limits that are the same in both directions are centred on the middle of the stage's travel, where the output of a
     unipolar drive is not 0.
     """
 
@@ -72,8 +72,7 @@ class TanhSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to a thousand times that range; then also the centre, within the
-        output."""
+        """The level, from a tenth to a thousand times the output range; then also the centre, within the output."""
         low, high = about.drive
         bottom = about.output_range * low / (high - low)  # for plays without hysteresis
 
@@ -119,10 +118,10 @@ class Stops(_Saturation):
     """
 
     shape: Literal["stops"] = Field(description="elastic stops at either end")
-    lower: Number = Field(description="where the lower one begins, output units", examples=[-1.0])
-    upper: Number = Field(description="where the upper one begins, above lower, output units", examples=[38.0])
+    lower: Number = Field(description="start of the lower stop, output units", examples=[-1.0])
+    upper: Number = Field(description="start of the upper stop, above lower, output units", examples=[38.0])
     give: Annotated[NotNegative, Field(le=1.0)] = Field(
-        default=0.0, description="slope beyond them over that between, 0 is hard", examples=[0.1]
+        default=0.0, description="slope beyond the stops relative to that between, 0 for hard stops", examples=[0.1]
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:

@@ -13,7 +13,7 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas at which a search starts, 10 % at the end of the range: from a linear sensor the search may overshoot."""
+"""Parabolas from which a search starts, 10 % at the end of the range: from a linear sensor it could overshoot."""
 
 PIECES = (6, 12)
 """Numbers of pieces of the monotone curves that are tried if a cubic helps. For a square root over the range, the
@@ -53,7 +53,7 @@ class SensorPolynomial(_Sensor):
 
     shape: Literal["polynomial"] = Field(default="polynomial", description="a polynomial of the output")
     coefficients: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
-        description="c_2, c_3, .., shares of scale", examples=[[0.01, -0.005]]
+        description="c_2, c_3, .., fractions of scale", examples=[[0.01, -0.005]]
     )
     scale: Positive = Field(description="output at which xi = 1, output units", examples=[50.0])
 
@@ -98,7 +98,7 @@ class SensorCurve(_Sensor):
         description="outputs, rising, output units", examples=[[0.0, 10.0, 20.0]]
     )
     values: Annotated[tuple[Number, ...], Field(min_length=2, max_length=MAX_KNOTS)] = Field(
-        description="what the sensor shows there, rising, output units", examples=[[0.0, 11.0, 20.0]]
+        description="sensor readings at the knots, rising, output units", examples=[[0.0, 11.0, 20.0]]
     )
 
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")
@@ -122,8 +122,8 @@ class SensorCurve(_Sensor):
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array]:
-        """The knots, and coefficients (4, pieces + 2), including both end pieces, of powers of the distance from the
-        knot below."""
+        """The knots, and coefficients (4, pieces + 2) of powers of the distance from the knot below; with both end
+        pieces."""
         x, y = np.array(self.knots), np.array(self.values)
         steps, slopes = np.diff(x), np.diff(y) / np.diff(x)
         at = np.concatenate([slopes[:1], 2.0 / (1.0 / slopes[:-1] + 1.0 / slopes[1:]), slopes[-1:]])

@@ -14,7 +14,7 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""[decades] Starts below the fastest recorded rate: a limit that acts never or always has no gradient to follow."""
+"""[decades] Starts below the fastest recorded rate: a limit that never or always acts gives the search no gradient."""
 
 BESIDE = 10.0
 """[times] A step of the drive is at least this many times faster than the adjacent changes, which are about equal in a
@@ -65,8 +65,8 @@ def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: N
 
     An edge is a change within one sample or two, `BESIDE` times as fast as its neighbours. With `edge` 1/2 it happens
     at the mean time of the change: halfway between two samples or, if an averaging converter shows a sample in between,
-    before the end of that sample by the share of the step that the sample shows. Any other `edge` shifts it by as much
-    as between two samples. A linear filter distinguishes it from a linear edge only by second differences.
+    before the end of that sample by the fraction of the step that the sample shows. Any other `edge` shifts it by as
+    much as between two samples. A linear filter distinguishes it from a linear edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
@@ -134,8 +134,7 @@ class _SlewLimit(Effect):
 
     @classmethod
     def _candidate(cls, label: str, n: int, about: About, anywhere: bool = False, **more: Any) -> Candidate:
-        """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the position of
-        edges."""
+        """One rate, or one per direction, up to the fastest recorded one; `anywhere`: also the position of edges."""
         fastest = np.log10(max(about.fastest, 1e-12))
         shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
 
@@ -163,7 +162,7 @@ class SlewLimit(_SlewLimit):
     Exact if `v` is linear between samples.
     """
 
-    shape: Literal["straight"] = Field(default="straight", description="the drive is straight between samples")
+    shape: Literal["straight"] = Field(default="straight", description="the drive is linear between samples")
 
     later: ClassVar[tuple[str, ...]] = ("shape",)
 
@@ -209,7 +208,7 @@ class SuddenSlewLimit(_SlewLimit):
         return self._averaged(a, then, run.t, times, drive) if self.edge == MIDDLE and n > len(a) else then
 
     def _averaged(self, a: Array, then: Array, t: Array, times: Array, drive: Array) -> Array:
-        """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: its value at the
+        """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: value at the
         sample.
 
         Where the drive steps or is linear, a sample `a` is its mean, and the mean distance is added. Where it bends,

@@ -19,7 +19,7 @@ COLUMN = "temperature"
 SELF_HEATING = "thermal, self-heating"
 
 SHARES = (0.3, 0.15, 0.5)
-"""Starts of searches, as shares of the logarithmic distance from the longest time constant down to the shortest."""
+"""Starts of searches, as fractions of the logarithmic distance from the longest time constant down to the shortest."""
 
 SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 """[decimal logarithms of ranges of the drive] Reach of the rubbing elements: bounds and start of a search."""
@@ -288,8 +288,8 @@ def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple
 
 
 def _kept(share: Array) -> Array:
-    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's heat
-    does not enter."""
+    """Coefficients of the temperature and of the heat of each step, for step lengths in time constants; the next step's
+    heat does not enter."""
     return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 

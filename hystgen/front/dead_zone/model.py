@@ -78,7 +78,7 @@ class DeadZone:
         return tuple(points)
 
     def _value(self, x: float) -> float:
-        if math.isinf(x):  # take the sign from the end piece's slope, since infinite terms may cancel
+        if math.isinf(x):  # take the sign from the end piece's slope, since infinite terms can cancel
             slope = self.piece_slopes[-1 if x > 0 else 0]
             return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
         rho, eta, least, most = self._terms
@@ -165,13 +165,13 @@ class DeadZone:
         return range(first, max(first, last) + 1)
 
     def image(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
-        """Least and largest value over [low, high], which occur at the ends or at breaks."""
+        """Smallest and largest value over [low, high], which occur at the ends or at breaks."""
         inside = slice(bisect.bisect_right(self.breaks, low), bisect.bisect_left(self.breaks, high))
         values = (self._value(low), self._value(high), *self._values[inside])
         return min(values), max(values)
 
     def slope_range(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
-        """Least and largest slope of the pieces within [low, high]."""
+        """Smallest and largest slope of the pieces within [low, high]."""
         slopes = [self.piece_slopes[j] for j in self._pieces(low, high)]
         return min(slopes), max(slopes)
 

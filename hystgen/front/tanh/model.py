@@ -18,12 +18,12 @@ Branch = tuple[float, float, float, float]
 
 
 def _tanh(x: float) -> float:
-    """As compiled code computes it, on every machine."""
+    """The value that compiled code computes, with the same bits on every machine."""
     return float(kernels.tanh.py_func(float(x), kernels.SCALAR[0]))
 
 
 def _atanh(x: float) -> float:
-    """As compiled code computes it, on every machine."""
+    """The value that compiled code computes, with the same bits on every machine."""
     return float(kernels.atanh.py_func(float(x), kernels.SCALAR[1]))
 
 

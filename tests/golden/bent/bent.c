@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 14b05417ade167a2d4968dba7eb801cd1cd65ff33d69e0d0d2c6669904eb7dfb, without this line
+ * Text: sha256 38e4b3b68802b9fb82fefeb5564643abd775f8e4553f271323c0a470e8688c9f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -13,15 +13,15 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   pending: the last returned drive: it enters the memory only when the next call absorbs it, or the
-       drive committed in its place.
+   pending: the last returned drive; the next call absorbs it into the memory, or the drive
+       committed in its place.
 */
 
 /* Products are rounded before they are added, whatever the compiler's default. clang and others
-   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
-   casts and inline functions alike: only a volatile object or a call for each product would keep
-   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
-   on targets with a fused instruction. */
+   obey the C99 pragma. gcc ignores it and fuses products and sums even across statements,
+   assignments, casts and inline functions; only a volatile object or a call for each product would
+   keep the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used
+   only on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -57,7 +57,7 @@ typedef struct {
     uint_least16_t n;
 } bent_dead_zone_t;
 
-/* Output of a dead-zone sum at x; bisects for the straight piece. */
+/* Output of a dead-zone sum at x; finds the straight piece by bisection. */
 static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -72,7 +72,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Input of a dead-zone sum at its output y; bisects for the straight piece. */
+/* Input of a dead-zone sum for its output y; finds the straight piece by bisection. */
 static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;

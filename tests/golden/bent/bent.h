@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 46f19583b4b156fc4fd16cd81038df330352c75065ca77c6a43784376ce09c6f, without this line
+ * Text: sha256 81c5b162b5fa3fa51e1de4cee95fb0575e823b49fd15a20ea14e74b8a78bd799, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -45,8 +45,8 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "bent: build without -fassociative-math: the order of additions is part of the answer"
 #endif
-/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
-   own macro stays. */
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in every C++ dialect of avr-gcc 5; the
+   compiler's own macro remains defined. */
 #if defined(FLT_EVAL_METHOD)
 #define BENT_EVAL_METHOD FLT_EVAL_METHOD
 #elif defined(__FLT_EVAL_METHOD__)
@@ -192,10 +192,10 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u);
  *
  * @param self the instance
  * @param applied drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: BENT_STATUS_INPUT_CLAMPED, BENT_STATUS_HELD
- * @note Cost: a few comparisons: the next step absorbs the drive
+ * @note Cost: a few comparisons; the next step absorbs the drive
  */
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied);
 

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 a283eb7347b70e43f20ee44e9f3de03de4fb65ffafe36eeeee9c7be88c34bbef, without this line
+ * Text: sha256 64d95d48425913bfc2d46b30d4dd5c7cc0c4a6e89106657b6a1c68d4e99b9f1f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
@@ -22,7 +22,7 @@
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: a straight piece of output over input, up to where the next play begins to follow.
+   segment: a straight piece of output against input, up to where the next play begins to follow.
    kink: a point along the move where another play begins to follow.
 */
 
@@ -316,7 +316,7 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
 }
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
-   Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
+   Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
    coefficients from degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
         unsigned int pieces, unsigned int degree, int32_t x) {
@@ -458,7 +458,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
         curved_front_coefficient, CURVED_FRONT_PIECES, CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w], or an end of G for w beyond it. */
+/* v = G^-1[w]; for w beyond G, the nearer end of G. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 d1ad733c9bb0db9aca8b4ae686f9ca88b78cb19652040e2b20545d3cc6e4fbd1, without this line
+ * Text: sha256 b24519c0a6627f36e8e24b737511bb97c9c88e2332eae51a3d930f36f9946601, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -119,7 +119,7 @@ typedef struct {
     bool limited;            /* no drive reaches `reference`; kept here rather than on the stack */
     uint_least8_t bits;      /* status of the last returned drive */
     unsigned int status;
-    curved_place_t undo; /* place of the plays before the last step */
+    curved_place_t undo; /* position of the plays before the last step */
     curved_kink_t kink;  /* of the present step; kept here rather than on the stack */
     curved_corner_t corner[6];
 } curved_inverse_t;
@@ -164,7 +164,7 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u);
  *
  * @param self the instance
  * @param applied drive, in codes of CURVED_DRIVE_LSB V; limited to CURVED_DRIVE_MIN .. MAX
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: CURVED_STATUS_INPUT_CLAMPED
  * @note Cost: at most that of a step

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 2d32c4645aa49532a02dff77fb1eb5f395415a2824dc28e06553417316452bd3, without this line
+ * Text: sha256 22eb0f9bbcef5246e2f01991bd3defead0fa5d1032a14c8f25f41a9838e39b74, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
@@ -22,16 +22,16 @@
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: a straight piece of output over input, up to where the next play begins to follow.
+   segment: a straight piece of output against input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
 
 /* Products are rounded before they are added, whatever the compiler's default. clang and others
-   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
-   casts and inline functions alike: only a volatile object or a call for each product would keep
-   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
-   on targets with a fused instruction. */
+   obey the C99 pragma. gcc ignores it and fuses products and sums even across statements,
+   assignments, casts and inline functions; only a volatile object or a call for each product would
+   keep the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used
+   only on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 2af3f0e7a663e258a8a77c92effbeaf69f7ade7091dc11e42f7d96bbd365bcb3, without this line
+ * Text: sha256 fed65ad3293fc50a68f28eae6d1f8e36b87bc97250bd002e98e9307579faa00d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -43,8 +43,8 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "plain: build without -fassociative-math: the order of additions is part of the answer"
 #endif
-/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
-   own macro stays. */
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in every C++ dialect of avr-gcc 5; the
+   compiler's own macro remains defined. */
 #if defined(FLT_EVAL_METHOD)
 #define PLAIN_EVAL_METHOD FLT_EVAL_METHOD
 #elif defined(__FLT_EVAL_METHOD__)
@@ -130,9 +130,9 @@ typedef struct {
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     plain_plays_t plays;
-    plain_place_t undo;    /* place of the plays before the last step, if not along a line */
+    plain_place_t undo;    /* position of the plays before the last step, if not along a line */
     plain_real_t before;   /* input before a step along a line, else the present input */
-    plain_real_t returned; /* by the last step, if another drive was committed since */
+    plain_real_t returned; /* the last step's drive, if another was committed since */
     bool stepped;          /* a step has returned a drive */
     bool committed;        /* a drive was committed since */
     unsigned int status;
@@ -177,7 +177,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD
  * @note Cost: at most that of a step

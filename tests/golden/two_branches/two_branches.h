@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 569918285a1ef6a0d7fa99f381f8fddd1b1a47f22a4ef60d966d40c84d8f0790, without this line
+ * Text: sha256 2c03963bd593cec87fabd194270978c1a075ca3316fad05cc96bac56c96a1e5d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -46,8 +46,8 @@
 #error "two_branches: build without -fassociative-math: the order of additions is part of the " \
        "answer"
 #endif
-/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
-   own macro stays. */
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in every C++ dialect of avr-gcc 5; the
+   compiler's own macro remains defined. */
 #if defined(FLT_EVAL_METHOD)
 #define TWO_BRANCHES_EVAL_METHOD FLT_EVAL_METHOD
 #elif defined(__FLT_EVAL_METHOD__)
@@ -139,12 +139,12 @@ typedef struct {
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     two_branches_plays_t plays;
-    two_branches_place_t undo; /* place of the plays before the last step */
+    two_branches_place_t undo; /* position of the plays before the last step */
     two_branches_real_t drive; /* present drive */
     two_branches_real_t undo_drive;
-    two_branches_real_t returned;  /* by the last step, if another drive was committed since */
+    two_branches_real_t returned;  /* the last step's drive, if another was committed since */
     two_branches_real_t reference; /* of the last step */
-    /* the same, limited: the next reference moves up or down from here */
+    /* `reference`, limited: the next one moves up or down from here */
     two_branches_real_t last;
     bool ascending; /* direction of the drive's last move */
     bool undo_ascending;
@@ -197,7 +197,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it gives a
+ * @pre after a step and before the next one, any number of times; before the first step it sets a
  *     first drive
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD
  * @note Cost: at most that of a step
@@ -227,7 +227,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+   move: the rise or the fall of the input from one turning point to the next. Lengths are measured
        along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
@@ -236,7 +236,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: a straight piece of output over input, up to where the next play begins to follow.
+   segment: a straight piece of output against input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
@@ -246,10 +246,10 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #endif
 
 /* Products are rounded before they are added, whatever the compiler's default. clang and others
-   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
-   casts and inline functions alike: only a volatile object or a call for each product would keep
-   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
-   on targets with a fused instruction. */
+   obey the C99 pragma. gcc ignores it and fuses products and sums even across statements,
+   assignments, casts and inline functions; only a volatile object or a call for each product would
+   keep the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used
+   only on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -372,13 +372,13 @@ static two_branches_real_t two_branches_tanh(two_branches_real_t x) {
 }
 
 /*
- * atanh x for |x| < 1, without division. Any other x, NaN included, counts as the largest float
- * below 1.
+ * atanh x for |x| < 1, without division. Any other x, NaN included, is replaced by the largest
+ * float below 1.
  *
  * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
  * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
  * the distances d and e from the center of a piece of [1, 2); each center is a point whose
- * logarithm is almost a float. k and the pieces are read off the integer 2^24 (1 - |x|).
+ * logarithm is almost a float. k and the piece are read off the integer 2^24 (1 - |x|).
  * fit_coefficients.py derives the numbers. Worst error over all floats: 1.07 ulp, and 0.84 where
  * |x| < 0.999. The function is odd and never decreases; it keeps subnormal numbers and the sign of
  * zero.
@@ -403,7 +403,7 @@ static const two_branches_real_t two_branches_atanh_row[8][5] = {
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
-/* The piece of [1, 2) that holds m / 2^24. */
+/* Index of the piece of [1, 2) that contains m / 2^24. */
 static inline unsigned int two_branches_atanh_piece(uint_least32_t m) {
     return (unsigned int)(m >> 21) & 7u;
 }
