@@ -157,7 +157,7 @@ class Measured:
             most = float(self.compiled.tables.limits.code_max[0])
             u = np.clip(u, -most, most)
         sent = answers(self.compiled, Run(self.t, u, extra), True).astype(float) * self.drive
-        ends = tuple(float(end) * self.drive for end in self.compiled.tables.limits.drives)
+        ends = tuple(float(end) * self.drive for end in self.compiled.tables.limits.drive[0])
         reached = np.clip(u * self.output, low, high)
         if self.same:
             op = np.tile(np.array([slots.OP_STEP, slots.OP_COMMIT], dtype=np.uint8), LENGTH)

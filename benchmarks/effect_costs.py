@@ -93,7 +93,7 @@ def measured(
     files = sources.write(folder, one, options)
     constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
-    low, high = map(float, numbers.limits.outputs if operator == "inverse" else numbers.limits.drives)
+    low, high = map(float, numbers.limits.output[0] if operator == "inverse" else numbers.limits.drive[0])
     u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))
     record = comparison.expected_record(numbers, real, operator == "inverse", ("sine", np.zeros(len(u), np.uint8), u))
     code, counts = {}, {}

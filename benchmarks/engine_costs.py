@@ -70,7 +70,7 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
     one = model(n, DEAD_ZONE if kind.startswith("gpi") else "", GAIN if kind.endswith("effects") else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
-    ends = numbers.limits.drives
+    ends = numbers.limits.drive[0]
     drive = bench.multisine(bench.SAMPLES) * float(min(abs(ends[0]), ends[1]))
     drive = np.rint(drive) if real.kind == "i" else drive
     call = np.full(len(drive), slots.OP_STEP, dtype=np.uint8)

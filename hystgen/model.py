@@ -184,7 +184,7 @@ class Model:
         )
         if arithmetic in FIXED:
             compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
-            low, high = (int(end) for end in compiled.tables.limits.outputs)
+            low, high = (int(end) for end in compiled.tables.limits.output[0])
             if gain > MOST_A_CODE * (high - low):
                 raise UnsupportedEffectsError(
                     f"with a noise gain of {gain:.4g}, a step of one of the reference's {high - low} codes in "
@@ -341,7 +341,7 @@ class Model:
         )
         if inverse:
             return found, remarks.inverse(len(samples), clamped, limited, held)
-        ends = compiled.tables.limits.drives
+        ends = compiled.tables.limits.drive[0]
         return found, remarks.forward(samples, (float(ends[0]), float(ends[1])), True, held)
 
     def run(

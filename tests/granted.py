@@ -78,7 +78,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
     tables, form = build(
         model.cascade, arithmetic, "corners", parameters.emit.drive_lsb, parameters.emit.output_lsb
     )
-    least, most = int(tables.limits.play_min[0]), int(tables.limits.play_max[0])
+    least, most = int(tables.limits.play.low[0]), int(tables.limits.play.high[0])
     ends = [least, most, *map(int, tables.start)]
     way = max(max(ends) - min(ends), 2 * int(tables.threshold[-1]), *map(abs, ends))
     numbers = {
@@ -203,8 +203,8 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
     def most(dropped: NDArray[np.int64], bits: int) -> int:
         return 2 ** (bits + int(np.max(dropped, initial=0)))
 
-    ends = [int(t.plays.limits.play_min[0]), int(t.plays.limits.play_max[0]), *t.plays.start.tolist()]
-    drive = max(map(abs, t.plays.limits.drives.tolist())) * 2 ** int(t.number.arriving_bits[0])
+    ends = [int(t.plays.limits.play.low[0]), int(t.plays.limits.play.high[0]), *t.plays.start.tolist()]
+    drive = max(map(abs, t.plays.limits.drive[0].tolist())) * 2 ** int(t.number.arriving_bits[0])
     led = most(t.of("lag").led.drop, 50)
     rubbed = int(t.limits.code_max[0]) * most(t.of("heat").friction.bits, 0)
     numbers = {

@@ -66,7 +66,7 @@ def compiled(one: Model, arithmetic: str) -> tables.Compiled:
 def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> Run:
     """A smooth reference with plateaus, over a share of the output range, at speeds that bounds hold for."""
     rng = np.random.default_rng(seed)
-    low, high = (float(end) for end in one.tables.limits.outputs)
+    low, high = (float(end) for end in one.tables.limits.output[0])
     still = rng.random(n) < 0.2
     still[n // 2 : n // 2 + 100] = True
     phase = np.cumsum(np.where(still, 0.0, rng.uniform(0.0, 0.03, n)))
@@ -153,7 +153,7 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
     rng = np.random.default_rng([len(name), len(arithmetic)])
     one = model(name, QUIETED[name] + "emit: {compensation: {quiet: true}}\n")
     numbers = tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
-    low, high = (float(end) for end in numbers.tables.limits.outputs)
+    low, high = (float(end) for end in numbers.tables.limits.output[0])
     down, up = low + (high - low) * rng.uniform(0.2, 0.8, 2)
     way = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 60))
     moves = [low + (high - low) * way, high + (down - high) * way, down + (up - down) * way]
@@ -248,7 +248,7 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     slew = next((effect for effect in one.effects if effect.name == "slew_limit"), None)
     up, down = (np.inf, np.inf) if slew is None else (slew.rate * T, slew.falling_rate * T)
     free = (v > low) & (v < high) & (moved < up * (1.0 - 1e-9)) & (moved > -down * (1.0 - 1e-9))
-    span = float(np.ptp(numbers.tables.limits.outputs))
+    span = float(np.ptp([*numbers.tables.limits.output[0]]))
     assert np.mean(free) > 0.8
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
 
@@ -267,7 +267,7 @@ def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
     lag, slew = "name: lag, time_constant: 0.01", "name: slew_limit, rate: 700, falling_rate: 400"
     one = model("braked", chain("braked", lag, slew))
     numbers = compiled(one, arithmetic)
-    low, high = (float(end) for end in numbers.tables.limits.outputs)
+    low, high = (float(end) for end in numbers.tables.limits.output[0])
     near, far = np.rint(0.75 * low + 0.25 * high), np.rint(0.25 * low + 0.75 * high)
     u = np.repeat([near, far, near], [3, 150, 150])
     with jit.plain():
@@ -514,7 +514,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
     numbers = compiled(one, "float32")
     bound = bounds.chain_bounds(numbers, "float32")
     run = record(numbers, seed)
-    ends = tuple(float(end) for end in numbers.tables.limits.drives)
+    ends = tuple(float(end) for end in numbers.tables.limits.drive[0])
     v = answers(numbers, run, True).astype(float)
     wanted = Compensator(one.chain, one.parameters.emit.compensation).drives(run, ends)  # type: ignore[arg-type]
     known = N - numbers.ahead
@@ -684,7 +684,7 @@ def test_a_sensor_trims_the_offset_and_settings_are_limited() -> None:
     found, _ = reference.answers(numbers.tables, True, np.array(op, dtype=np.uint8), np.array(x))
     assert float(found[-1]) == pytest.approx(1.7, abs=0.02), "what is expected comes to what is measured"
     assert float(answer[-2]) > float(found[-3]), "the drive has gone down by what the plant lies above"
-    span = float(np.ptp(numbers.tables.limits.outputs))
+    span = float(np.ptp([*numbers.tables.limits.output[0]]))
     _, status = run_calls(one, [(slots.OP_OFFSET, 3 * span), (slots.OP_OFFSET, math.nan), (slots.OP_OFFSET, 0.1)])
     assert status.tolist() == [slots.LIMITED_SETTING, slots.HELD, 0]
 

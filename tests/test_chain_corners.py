@@ -114,7 +114,7 @@ def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> Non
 def reference_signal(one: Compiled, seed: int, n: int, share: float) -> Run:
     """A smooth reference with plateaus and turns of every size over a share of the output range, in float32."""
     rng = np.random.default_rng(seed)
-    low, high = (float(end) for end in one.tables.limits.outputs)
+    low, high = (float(end) for end in one.tables.limits.output[0])
     phase = np.cumsum(np.where(rng.random(n) < 0.2, 0.0, rng.uniform(0.0, 0.06, n)))
     u = 0.5 * (low + high) + 0.35 * share * (high - low) * (np.sin(phase) + 0.4 * np.sin(6.1 * phase))
     return Run(np.arange(n) * T, np.float32(u).astype(float), {"temperature": 20.0 + u})
@@ -129,7 +129,7 @@ def test_floating_point_stays_within_its_bounds(name: str) -> None:
     with jit.plain():
         v = answers(numbers, run, True).astype(float)
         y = answers(numbers, Run(run.t, v, run.extra), False)
-    ends = (float(numbers.tables.limits.drive_min[0]), float(numbers.tables.limits.drive_max[0]))
+    ends = (float(numbers.tables.limits.drive.low[0]), float(numbers.tables.limits.drive.high[0]))
     wanted = Compensator(one.chain).drives(run, ends)
     bound = bounds.chain_bounds(numbers, "float32")
     assert np.max(np.abs(v - wanted)) <= bound.inverse
@@ -163,7 +163,7 @@ def test_composes_with_the_forward_model_in_spite_of_commits_and_holds(seed: int
     y = one.simulate(v, t=run.t)
     free = ~other & ~held & (np.abs(v) < 4.0)
     assert np.mean(free) > 0.6
-    span = float(np.ptp(numbers.tables.limits.outputs))
+    span = float(np.ptp([*numbers.tables.limits.output[0]]))
     assert np.max(np.abs(y - run.v)[free]) <= 1e-12 * span
 
 

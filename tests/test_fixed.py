@@ -92,8 +92,8 @@ def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: 
     except FormatError:
         return
     for operator, ends, bound in (
-        ("forward", tables.limits.drives, form.forward_error),
-        ("inverse", tables.limits.outputs, form.inverse_error),
+        ("forward", tables.limits.drive[0], form.forward_error),
+        ("inverse", tables.limits.output[0], form.inverse_error),
     ):
         assert bound is not None
         codes = records(*map(int, ends), seed)
@@ -120,10 +120,10 @@ def test_bounds_are_not_slack(arithmetic: str) -> None:
     """The error of one model reaches a quarter of its bound, forward and inverse."""
     model = Cascade(PI([0, 0.1], [0.7, 0.05]), (), 0.0, (-1.0, 1.0))
     tables, form = built(model, arithmetic)
-    codes = records(*(int(x) for x in tables.limits.drives), 1)
+    codes = records(*(int(x) for x in tables.limits.drive[0]), 1)
     error = np.abs(Session(model, "forward", arithmetic).run(codes)[0] - double(model, "forward", form, codes)).max()
     assert error >= form.forward_error / 4
-    codes = records(*(int(x) for x in tables.limits.outputs), 1)
+    codes = records(*(int(x) for x in tables.limits.output[0]), 1)
     error = np.abs(Session(model, "inverse", arithmetic).run(codes)[0] - double(model, "inverse", form, codes)).max()
     assert form.inverse_error is not None
     assert error >= form.inverse_error / 4
@@ -148,7 +148,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     slopes = [each.front_slopes for each in single]
     both = max(s[1] for s in slopes) / min(s[0] for s in slopes)
     assert form.inverse_rounding <= 2 * max(b * both / (s[1] / s[0]) for b, s in zip(alone, slopes, strict=True))
-    low, high = (int(x) for x in tables.limits.outputs)
+    low, high = (int(x) for x in tables.limits.output[0])
     k = np.linspace(0, 1, 3000)
     codes = np.rint((low + high) / 2 + (high - low) / 2 * np.sin(30 * k) * (1 - 0.9 * k)).astype(np.int64)
     ours, exact = Session(model, "inverse", arithmetic), Session(model, "inverse", clamp=True)
@@ -174,13 +174,13 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
                           "zero", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument",
                           "below")
         },
-        limits=slots.Limits.of(tables.limits.tolist(), object),
+        limits=slots.LimitTable.of(tables.limits.tolist(), object),
     )  # fmt: skip
     for inverse in (False, True):
         state, operations = reference.new_state(whole, inverse), reference.operations(tables, inverse)
         with plain():
             operations.init(whole, state)
-        codes = records(*map(int, tables.limits.outputs if inverse else tables.limits.drives), 3)[::7]
+        codes = records(*map(int, tables.limits.output[0] if inverse else tables.limits.drive[0]), 3)[::7]
         answers = []
         for code in codes.tolist():
             with plain():
@@ -217,7 +217,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     """The kernel's curve agrees with the model's own functions at every code of q15 and at 20 001 codes of q31."""
     model = load(name)
     tables, form = built(model, arithmetic)
-    low, high = (int(x) for x in tables.limits.drives)
+    low, high = (int(x) for x in tables.limits.drive[0])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
     front = reference.front(tables)
     lsb = fixed_tables.lsbs(model, arithmetic)

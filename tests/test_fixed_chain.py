@@ -80,7 +80,7 @@ def test_factors_are_multiplied_like_fractions() -> None:
 def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, Run]:
     """A smooth reference with plateaus over a share of the output range, in codes and in physical units."""
     rng = np.random.default_rng(seed)
-    low, high = (float(end) for end in one.tables.limits.outputs)
+    low, high = (float(end) for end in one.tables.limits.output[0])
     still = rng.random(N) < 0.2
     still[N // 2 : N // 2 + 100] = True
     phase = np.cumsum(np.where(still, 0.0, rng.uniform(0.0, 0.03, N)))
@@ -115,7 +115,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     given, exact = record(numbers, codes, seed, share)
     drive = float(codes.drive_lsb)
     v = answers(numbers, given, True).astype(float)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drive[0])
     wanted = Compensator(one.chain, one.parameters.emit.compensation).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
@@ -266,9 +266,9 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, 
     numbers, codes = compiled(one, arithmetic)
     v = swept(numbers, N)
     t, output, drive = np.arange(N) * T, float(codes.output_lsb), float(codes.drive_lsb)
-    ends = numbers.tables.limits.outputs
+    ends = numbers.tables.limits.output[0]
     u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))
-    range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits.drives)
+    range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits.drive[0])
     compensator = Compensator(one.chain, one.parameters.emit.compensation)
     wanted = compensator.drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
     worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
@@ -282,7 +282,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
     one = model(chain("led", *STILL[name]))
     numbers, codes = compiled(one, arithmetic)
     drive = float(codes.drive_lsb)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drive[0])
     for seed in range(3):
         given, exact = record(numbers, codes, seed, 0.5)
         v = answers(numbers, given, True).astype(float)
@@ -293,8 +293,8 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
             wanted = seen[::2] / drive
         else:
             wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
-        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits.drive_max[0]
-        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits.drive_max[0]
+        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits.drive.high[0]
+        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits.drive.high[0]
 
 
 @pytest.mark.thorough(but_one_in=8)
@@ -330,7 +330,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
             asked.append(slots.OP_COMMIT)
             given_to.append(answer * drive)
     w, _ = reference.answers(double.tables, True, np.array(asked, dtype=np.uint8), np.array(given_to))
-    low, high = numbers.tables.limits.drives
+    low, high = numbers.tables.limits.drive[0]
     wanted = np.clip(w[np.array(asked) == slots.OP_STEP] / drive, low, high)
     assert np.max(np.abs(v[calls == slots.OP_STEP] - wanted)) <= codes.inverse_rounding
 
@@ -342,7 +342,7 @@ def test_branches_are_mostly_the_same(arithmetic: str) -> None:
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, 5, 0.5)
     drive = float(codes.drive_lsb)
-    ends = tuple(float(end) * drive for end in numbers.tables.limits.drives)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits.drive[0])
     wanted = Compensator(one.chain).drives(exact, ends)  # type: ignore[arg-type]
     left = np.abs(answers(numbers, given, True) - wanted / drive)
     assert np.quantile(left, 0.9) <= codes.inverse_rounding < 0.1 * codes.inverse_error
@@ -503,7 +503,7 @@ def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
     """With creep alone, the drive stops changing once within rounding; behind a lag a code either way may remain."""
     one = model(chain("still", *STILL[name]))
     numbers, _ = compiled(one, arithmetic)
-    low, high = (int(end) for end in numbers.tables.limits.outputs)
+    low, high = (int(end) for end in numbers.tables.limits.output[0])
     n = 12_000
     allowed = {"creep": 0, "lag": 2, "exact": 1, "lag_and_creep": 2}[name]
     for share in np.random.default_rng(0).uniform(0.15, 0.85, 6):
@@ -561,7 +561,7 @@ def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
     rng = np.random.default_rng(3)
     u = np.rint(3.0 * np.sin(0.02 * np.arange(800)) / float(codes.output_lsb)).astype(np.int64)
     calls: list[tuple[int, int]] = []
-    low, high = (int(end) for end in numbers.tables.limits.drives)
+    low, high = (int(end) for end in numbers.tables.limits.drive[0])
     for k, each in enumerate(u.tolist()):
         calls.append((slots.OP_STEP, each))
         if k % 7 == 3:
@@ -698,7 +698,7 @@ def test_status_tells_at_either_end_that_a_saturation_has_no_input(
     one = model(chain("limited", f"name: saturation, level: {level:g}, centre: {centre:g}"))
     numbers = tables.build(one.chain, arithmetic, T)
     scale = 1.0 if numbers.codes is None else 1.0 / float(numbers.codes.output_lsb)
-    limits = numbers.tables.limits.outputs.astype(float)
+    limits = np.array([*numbers.tables.limits.output[0]], dtype=float)
     for way, u in zip((-level, level), limits.tolist(), strict=True):
         to_limit = u - (centre + way + 0.5) * scale
         for share, seen in ((0.0, False), (1.001, True)):
@@ -724,7 +724,7 @@ def test_weights_of_the_reference_stay_within_bounds_and_come_to_rest(arithmetic
     v = answers(numbers, given, True) * float(codes.drive_lsb)
     wanted = answers(double, exact, True)
     assert np.max(np.abs(v - wanted)) <= codes.inverse_error * float(codes.drive_lsb)
-    low, high = numbers.tables.limits.outputs.tolist()
+    low, high = numbers.tables.limits.output[0].tolist()
     step = np.repeat([0.2 * low, 0.7 * high], [5, 200]).round()
     v = answers(numbers, Run(np.arange(205) * T, step, {}), True)
     assert len(set(v[5 + len(numbers.taps.weights) :].tolist())) == 1

@@ -197,7 +197,7 @@ def test_what_needs_no_average_has_none() -> None:
     allowed = emitted_files(model(LAG, CREEP, front=BRANCHES, noise_gain=1e3))
     bare = [re.sub(r"sha256 \w+|SHA256 .*", "", text) for text in (plain["noisy.c"], allowed["noisy.c"])]
     assert bare[0] == bare[1]
-    assert compiled(model(CREEP)).tables.limits.output_min[0] < 0.0
+    assert compiled(model(CREEP)).tables.limits.output.low[0] < 0.0
 
 
 HEAD = "hystgen: 1\nname: noisy\nunits: {input: V, output: um}\nsample_time: %s\ninput_range: [0, 100]\nmodel:\n"

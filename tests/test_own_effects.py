@@ -75,7 +75,7 @@ def both(folder: Path, *more: str) -> Model:
 
 def reference(one: Model, arithmetic: str, seed: int, n: int = 1500) -> tuple[tables.Compiled, Run]:
     compiled = tables.build(one.chain, arithmetic, T)
-    low, high = (float(end) for end in compiled.tables.limits.outputs)
+    low, high = (float(end) for end in compiled.tables.limits.output[0])
     phase = np.cumsum(np.random.default_rng(seed).uniform(0.0, 0.02, n))
     u = np.float32(0.5 * (low + high) + 0.4 * (high - low) * np.sin(phase))
     return compiled, Run(np.arange(n) * T, u.astype(float))
@@ -143,7 +143,7 @@ def after_the_same(one: Model, u: Array, sent: Array) -> Array:
     op = np.tile(np.array([slots.OP_STEP, slots.OP_COMMIT], dtype=np.uint8), len(u))
     double = tables.build(one.chain, "float64", T)
     found, _ = computed(double.tables, True, op, np.column_stack([u, sent]).ravel(), compiled=False)
-    low, high = double.tables.limits.drives
+    low, high = double.tables.limits.drive[0]
     return np.asarray(np.clip(found[::2], low, high))
 
 
@@ -162,7 +162,7 @@ def test_errors_stay_within_the_bounds_that_follow_from_the_functions(
         with jit.plain():
             v = answers(compiled, run, True).astype(float)
             y = answers(compiled, Run(run.t, v), False).astype(float)
-        ends = tuple(float(end) for end in compiled.tables.limits.drives)
+        ends = tuple(float(end) for end in compiled.tables.limits.drive[0])
         if bounds.condition(compiled):
             wanted = after_the_same(one, run.v, v)
         else:
@@ -198,7 +198,7 @@ def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, ef
     compiled = tables.build(one.chain, arithmetic, T)
     codes, limits = compiled.codes, compiled.tables.limits
     assert codes is not None
-    low, high, most = map(float, (*limits.outputs, limits.code_max[0]))
+    low, high, most = map(float, (*limits.output[0], limits.code_max[0]))
     drive, displacement = float(codes.drive_lsb), float(codes.output_lsb)
     n = 200
     t, op = np.arange(n) * T, np.full(n, slots.OP_STEP, dtype=np.uint8)
@@ -207,9 +207,9 @@ def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, ef
     for shape in (0.5 * np.sin(phase), np.sign(np.sin(3.0 * phase)), noise):
         u = np.rint(0.5 * (low + high) + 0.5 * (high - low) * shape)
         v = computed(compiled.tables, True, op, u, compiled=False)[0].astype(float)
-        ends = float(limits.drive_min[0]) * drive, float(limits.drive_max[0]) * drive
+        ends = float(limits.drive.low[0]) * drive, float(limits.drive.high[0]) * drive
         if codes.condition:
-            assert codes.inverse_error == limits.drive_max[0] - limits.drive_min[0]
+            assert codes.inverse_error == limits.drive.high[0] - limits.drive.low[0]
             wanted = np.clip(after_the_same(one, u * displacement, v * drive), *ends)
         else:
             wanted = Compensator(one.chain).drives(Run(t, u * displacement), ends)

@@ -184,7 +184,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
     code, state = reference.operations(numbers, inverse), reference.new_state(numbers, inverse)
-    low, high = numbers.limits.outputs if inverse else numbers.limits.drives
+    low, high = numbers.limits.output[0] if inverse else numbers.limits.drive[0]
     drive_low, drive_high = model.input_range
     op = np.array([kind for kind, _ in made], dtype=np.uint8)
     x = np.array(

@@ -228,7 +228,7 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
         name: (op, x.astype(real)) for name, op, x in signals.suite(numbers, np.dtype(real), inverse, 100_000)
     }
     assert all(len(op) == len(x) == 100_000 for op, x in records.values())
-    low, high = numbers.limits.outputs if inverse else numbers.limits.drives
+    low, high = numbers.limits.output[0] if inverse else numbers.limits.drive[0]
 
     def reversals(name: str) -> int:
         moves = np.diff(records[name][1])

@@ -40,7 +40,7 @@ from hystgen.front.curve import HALF
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
-from hystgen.plays.slots import Limits
+from hystgen.plays.slots import LimitTable
 
 SUM_BITS = 62
 """Bits of a sum of products, excluding its sign: 64 bits then hold the difference of two such sums."""
@@ -393,9 +393,9 @@ class Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = Limits.zeros(1)
-        limits.drive_min[0], limits.drive_max[0] = self.drive
-        limits.output_min[0], limits.output_max[0] = self.output
+        limits = LimitTable.zeros(1)
+        limits.drive.low[0], limits.drive.high[0] = self.drive
+        limits.output.low[0], limits.output.high[0] = self.output
         limits.offset[0] = self.offset
         far = 2 * max(map(abs, c.input_range))  # has the effect of any drive beyond the range, and is finite
 
@@ -408,7 +408,7 @@ class Builder:
         if c.branches_differ and self.invertible:
             limits.hold[0] = math.floor(2 * (self._inverse_rounding() or 0))
         limits.real_max[0] = 2**SUM_BITS
-        limits.play_min[0], limits.play_max[0] = self.play
+        limits.play.low[0], limits.play.high[0] = self.play
         limits.margin[0], limits.fraction[0] = self.margin, self.bits
         limits.fine[0], limits.code_max[0] = self.fine, self.code_max
         limits.saturated[0] = self._saturated()

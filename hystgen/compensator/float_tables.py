@@ -23,7 +23,7 @@ from hystgen.front.tanh import kernels
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Literals, Start
-from hystgen.plays.slots import Limits
+from hystgen.plays.slots import LimitTable
 
 
 def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
@@ -181,7 +181,7 @@ def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
 
 
 def _corners(
-    cascade: StaticModel, dtype: Any, limits: Limits | None, seen: tuple[float, float]
+    cascade: StaticModel, dtype: Any, limits: LimitTable | None, seen: tuple[float, float]
 ) -> dict[str, Any]:
     """The entries of `Tables` for the corner engine; `limits`: as in `Tables`, None for no limits; `seen`:
     range of the plays' input."""
@@ -190,7 +190,7 @@ def _corners(
     if not cascade.inverse_problems():
         ends = None
         if limits is not None:
-            low, high, least, most, offset = map(dtype, (*limits.drives, *limits.outputs, limits.offset[0]))
+            low, high, least, most, offset = map(dtype, (*limits.drive[0], *limits.output[0], limits.offset[0]))
             ends = (low, high, least - offset, most - offset)
         inverse = _inverse_curve(cascade, dtype, ends)
     memories = {"first": cascade.pi.start, "zero": (0.0,) * len(cascade.pi.start)}
@@ -247,7 +247,7 @@ def build_float(
         sizes.append(size)
         numbers += data
 
-    limits = Limits.zeros(1, np.float64)
+    limits = LimitTable.zeros(1, np.float64)
     if bounded:
         drive = inward(*cascade.input_range, dtype)
         outputs = inward(*cascade.output_range, dtype)
@@ -256,8 +256,8 @@ def build_float(
             raise FormatError((("input_range",), message))
     else:
         drive = outputs = -largest, largest
-    limits.drive_min[0], limits.drive_max[0] = map(float, drive)
-    limits.output_min[0], limits.output_max[0] = map(float, outputs)
+    limits.drive[0] = tuple(map(float, drive))
+    limits.output[0] = tuple(map(float, outputs))
     limits.offset[0] = cascade.output_offset
 
     def not_above(v: float) -> tuple[float, bool]:
@@ -271,7 +271,7 @@ def build_float(
     if cascade.branches_differ and not cascade.inverse_problems():
         limits.hold[0] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits.real_max[0] = largest
-    reached = max(map(abs, limits[0].tolist()))
+    reached = float(np.max(np.abs(np.array(limits).view(np.float64))))
     if reached > largest:
         message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
         raise FormatError((("model",), message))
@@ -289,7 +289,7 @@ def build_float(
             [1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights", "pi", "weights"
         ),
         start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states", "pi"),
-        limits=Limits.of(limits.tolist(), dtype),
+        limits=LimitTable.of(limits.tolist(), dtype),
         applied=np.array(applied, dtype=dtype),
         ascending=np.array(ascending, dtype=np.int64),
         stage_kind=np.array(kinds, dtype=np.int64),

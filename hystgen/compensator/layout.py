@@ -10,7 +10,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
 from hystgen.plays.corners.corners_float import Curve, Memory, Start, new_memory
-from hystgen.plays.slots import Counts, Limits, Reals
+from hystgen.plays.slots import Counts, LimitTable, Reals
 
 
 class Tables(NamedTuple):
@@ -23,7 +23,7 @@ class Tables(NamedTuple):
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 if all start at the same value
-    limits: Limits
+    limits: LimitTable
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Counts  # direction before the first move, in the order of `applied`
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
@@ -70,7 +70,7 @@ class FixedTables(NamedTuple):
     shift: Reals
     start: Reals
     zero: Reals  # all plays 0
-    limits: Limits
+    limits: LimitTable
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Reals  # direction before the first move, in the order of `applied`
     knot: Reals  # first argument of each piece, curve after curve
@@ -108,26 +108,26 @@ class Limited(Protocol):
     """The limits of drive and output, which all tables have."""
 
     @property
-    def limits(self) -> Limits: ...
+    def limits(self) -> LimitTable: ...
 
 
 @jit(inline=True)
 def clamp_drive(t: Limited, v: N) -> N:
     """v limited to the input range."""
-    if v < t.limits.drive_min[0]:
-        return t.limits.drive_min[0]
-    if v > t.limits.drive_max[0]:
-        return t.limits.drive_max[0]
+    if v < t.limits.drive.low[0]:
+        return t.limits.drive.low[0]
+    if v > t.limits.drive.high[0]:
+        return t.limits.drive.high[0]
     return v
 
 
 @jit(inline=True)
 def inverse_clamp(t: Limited, u: N) -> N:
     """u limited to the output range."""
-    if u < t.limits.output_min[0]:
-        return t.limits.output_min[0]
-    if u > t.limits.output_max[0]:
-        return t.limits.output_max[0]
+    if u < t.limits.output.low[0]:
+        return t.limits.output.low[0]
+    if u > t.limits.output.high[0]:
+        return t.limits.output.high[0]
     return u
 
 

@@ -169,7 +169,7 @@ class Session:
     def drive_range(self) -> tuple[float, float]:
         """`input_range` in the operator's own numbers: physical units, or codes in fixed point."""
         if self._fixed:
-            low, high = self.tables.limits.drives
+            low, high = self.tables.limits.drive[0]
             return float(low), float(high)
         return self._range
 

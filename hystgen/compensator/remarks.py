@@ -65,7 +65,7 @@ def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[N
         return answers, forward(signal, session.drive_range, limited, held)
     references, drives = status & slots.INPUT_CLAMPED != 0, status & slots.OUTPUT_CLAMPED != 0
     if moved is not None:
-        low, high = (float(end) for end in session.tables.limits.outputs)
+        low, high = (float(end) for end in session.tables.limits.output[0])
         with np.errstate(invalid="ignore"):
             missed = np.abs(signal - moved.run(answers)[0]) > ROUNDED * (high - low)
         references, drives = references & missed, drives & missed

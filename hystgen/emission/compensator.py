@@ -293,7 +293,7 @@ class Form(ABC):
 
 def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
     """Limits of drive and output."""
-    ends = [operand(x) for x in (*numbers.limits.drives, *numbers.limits.outputs)]
+    ends = [operand(x) for x in (*numbers.limits.drive[0], *numbers.limits.output[0])]
     return (ends[0], ends[1]), (ends[2], ends[3])
 
 
@@ -423,7 +423,7 @@ class EmittedModel:
     def measured(self) -> Measured | None:
         """The largest error that a search finds, for an inverse whose error only the range of the drive bounds."""
         limits = self.numbers.tables.limits
-        whole = float(limits.drive_max[0]) - float(limits.drive_min[0])
+        whole = float(limits.drive.high[0]) - float(limits.drive.low[0])
         if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
             return None
         from hystgen.chain.chain import Chain

@@ -92,7 +92,7 @@ class FixedForm(Form):
                 *_precision(parameters, form, " on the same branch" * bool(t.branches)),
                 f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 "
                 "bits hold 2^63),",
-                f"    inputs of plays between {ends.play_min[0]} and {ends.play_max[0]}, "
+                f"    inputs of plays between {ends.play.low[0]} and {ends.play.high[0]}, "
                 f"{form.sum_bits} fraction bits of an output code",
             ),
         )
@@ -175,7 +175,7 @@ class FixedForm(Form):
     def effects(self, t: ChainTables) -> list[Macro]:
 
         number = t.number
-        low, high = t.plays.limits.drives
+        low, high = t.plays.limits.drive[0]
         return [
             ("FINE_MIN", operand(low), "ends of the drive range at the output of the drive side"),
             ("FINE_MAX", operand(high), ""),
@@ -301,14 +301,14 @@ def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[Constant
 
 def _ends(t: FixedTables) -> list[str]:
     margin = t.limits.margin[0]
-    return [literal(t.limits.play_min[0] - margin), literal(t.limits.play_max[0] + margin)]
+    return [literal(t.limits.play.low[0] - margin), literal(t.limits.play.high[0] + margin)]
 
 
 def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
     """The tables of engine corners: one curve for both operators, and the contents of a start memory."""
     never = (t.reach[-1], t.way[-1], 0, 0, 1)
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
-    low, high = t.limits.play_min[0], t.limits.play_max[0]
+    low, high = t.limits.play.low[0], t.limits.play.high[0]
     ends = f"{{{entries([t.limits.margin[0] - low, high + t.limits.margin[0]])}}}"
     parts = [f"{writer.name}_model_segment", literal(t.limits.offset[0]), ends, str(len(t.threshold) - 1)]
     found = [

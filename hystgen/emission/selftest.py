@@ -91,7 +91,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     from hystgen.compensator.chain.parts import PARTS
 
     degree, one = setting_codes(t)
-    drive_low, drive_high, low, high = (float(end) for end in (*t.limits.drives, *t.limits.outputs))
+    drive_low, drive_high, low, high = (float(end) for end in (*t.limits.drive[0], *t.limits.output[0]))
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
         return drive_low + (0.5 + way) * (drive_high - drive_low)
@@ -108,8 +108,8 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
 
 def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[Sample]:
     numbers, between = one.numbers.tables, one.form.between
-    low, high = numbers.limits.outputs if inverse else numbers.limits.drives
-    drive_low, drive_high = numbers.limits.drive_min[0], numbers.limits.drive_max[0]
+    low, high = numbers.limits.output[0] if inverse else numbers.limits.drive[0]
+    drive_low, drive_high = numbers.limits.drive.low[0], numbers.limits.drive.high[0]
     calls, arguments = [], []
     for i, part in enumerate(_fractions(180)):
         calls.append(slots.OP_STEP)

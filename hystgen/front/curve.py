@@ -46,10 +46,10 @@ def front_inverse(t: CurveTables, w: int, ascending: int) -> tuple[int, int]:
     which = INVERSE + 1 - ascending
     if w > t.domain[which, 1]:
         if w > t.domain[which, 1] + t.edge[which, 1]:
-            return t.limits.drive_max[0] + 1, 1 if w > t.argument[which, 1] else 0
-        return t.limits.drive_max[0], 0
+            return t.limits.drive.high[0] + 1, 1 if w > t.argument[which, 1] else 0
+        return t.limits.drive.high[0], 0
     if w < t.domain[which, 0]:
         if w < t.domain[which, 0] - t.edge[which, 0]:
-            return t.limits.drive_min[0] - 1, 1 if w < t.argument[which, 0] else 0
-        return t.limits.drive_min[0], 0
+            return t.limits.drive.low[0] - 1, 1 if w < t.argument[which, 0] else 0
+        return t.limits.drive.low[0], 0
     return nearest(curve(t, which, w), t.below[which]), 0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.plays.slots import Counts, Limits, Reals
+from hystgen.plays.slots import Counts, LimitTable, Reals
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class CurveTables(Polynomials, Protocol):
     """Constants of the stages in fixed point, a part of `hystgen.compensator.layout.FixedTables`."""
 
     @property
-    def limits(self) -> Limits: ...
+    def limits(self) -> LimitTable: ...
     @property
     def domain(self) -> Reals: ...
     @property

@@ -100,11 +100,11 @@ def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> in
     """The input of the plays, at most slightly outside their range, at which the output is d beyond that at w."""
     step = divide_by_slope(t, d, k)
     if rising:
-        most = t.limits.play_max[0] + t.limits.margin[0]
+        most = t.limits.play.high[0] + t.limits.margin[0]
         if step > most - w:
             return most
         return w + step
-    least = t.limits.play_min[0] - t.limits.margin[0]
+    least = t.limits.play.low[0] - t.limits.margin[0]
     if step > w - least:
         return least
     return w - step

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from hystgen.basics.jit import Element, Scalar, jit
-from hystgen.plays.slots import Limits, Reals, StepState
+from hystgen.plays.slots import LimitTable, Reals, StepState
 
 
 class PlayTables(Protocol):
@@ -24,7 +24,7 @@ class PlayTables(Protocol):
     @property
     def weight(self) -> Reals: ...
     @property
-    def limits(self) -> Limits: ...
+    def limits(self) -> LimitTable: ...
 
 
 class LoopTables(PlayTables, Protocol):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,35 +24,29 @@ OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, O
 OP_CALL, OP_UNREAD = 127, 128
 
 
-class Limits(Struct):
-    """The limits of drive and output, and what goes with them; the second half is used in fixed point only."""
+class Range(Struct):
+    """The ends of a range."""
 
-    drive_min: Real
-    drive_max: Real
-    output_min: Real
-    output_max: Real
+    low: Real
+    high: Real
+
+
+class LimitTable(Struct):
+    """The limits of drive and output, and numbers that go with them; those from `play` on are for fixed point only."""
+
+    drive: Range
+    output: Range
     offset: Real  # added to every output
     hold: Real  # largest step back at which the drive is held instead
     real_max: Real  # largest number
     zero: Real  # in the type of the arithmetic
-    play_min: Real  # of the inputs of the plays
-    play_max: Real
+    play: Range  # of the inputs of the plays
     margin: Real  # by which rounding may take such an input further
     fraction: Real  # bits of a sum below an output code
     fine: Real  # bits of an input of the plays below a drive code
     code_max: Real  # largest code of either sign
     saturated: Real  # largest sum that is not reported as limited
     shy: Real  # [output codes] by which a step that may end at a limit is found beforehand
-
-    @property
-    def drives(self) -> NDArray[Any]:
-        """Least and largest drive."""
-        return np.append(self.drive_min, self.drive_max)
-
-    @property
-    def outputs(self) -> NDArray[Any]:
-        """Least and largest output."""
-        return np.append(self.output_min, self.output_max)
 
 
 class StepState(Struct):

@@ -73,7 +73,7 @@ def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np
     """A path through kinks, each reached to within one last bit, of the current memory and of that of init and
     reset."""
     whole = real.kind == "i"
-    low, high = (float(a) for a in tables.limits.drives)
+    low, high = (float(a) for a in tables.limits.drive[0])
     memory = _Textbook(tables)
     kinds = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT], dtype=np.uint8)
     op = rng.choice(kinds, length, p=[0.9, 0.06, 0.04])

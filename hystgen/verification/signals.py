@@ -64,7 +64,7 @@ def _coincidences(
     With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
     on the order of its checks.
     """
-    drive_low, drive_high = (float(a) for a in tables.limits.drives)
+    drive_low, drive_high = (float(a) for a in tables.limits.drive[0])
     finer = 2.0 ** int(tables.limits.fine[0]) if isinstance(tables, FixedTables) else 1.0
     ways = np.append(tables.threshold[1:].astype(float) / finer, drive_high - drive_low)
     drive = np.empty(400)
@@ -104,7 +104,7 @@ def _onto_the_bends(
 
     A piece between two bends can be as short as one code.
     """
-    low, high = (float(a) for a in tables.limits.drives)
+    low, high = (float(a) for a in tables.limits.drive[0])
     drive: NDArray[np.float64] = rng.choice(bends, length)
     drive = np.clip(drive + least(drive) * rng.integers(-1, 2, length), low, high)
     if not inverse:
@@ -138,8 +138,8 @@ def suite(
 
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
     """Steps mixed with all other calls, sparsely and densely."""
-    low, high = (float(a) for a in (tables.limits.outputs if inverse else tables.limits.drives))
-    drive_low, drive_high = (float(a) for a in tables.limits.drives)
+    low, high = (float(a) for a in (tables.limits.output[0] if inverse else tables.limits.drive[0]))
+    drive_low, drive_high = (float(a) for a in tables.limits.drive[0])
     rng = np.random.default_rng(20261126)
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
     if "set_temperature" in tables.calls:
@@ -201,7 +201,7 @@ def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple
 def _suite(
     tables: Tables | FixedTables, real_type: np.dtype[Any], inverse: bool, length: int
 ) -> Iterator[Calls]:
-    low, high = (float(x) for x in (tables.limits.outputs if inverse else tables.limits.drives))
+    low, high = (float(x) for x in (tables.limits.output[0] if inverse else tables.limits.drive[0]))
     middle, half = (low + high) / 2, (high - low) / 2
     whole = real_type.kind == "i"
     real = np.float64 if whole else real_type.type
@@ -270,7 +270,7 @@ def _suite(
     x[places] = rng.choice(special, int(places.sum()))
     yield "resets", rng.choice(kinds, length, p=chances), x
     if inverse:
-        drive_low, drive_high = (float(a) for a in tables.limits.drives)
+        drive_low, drive_high = (float(a) for a in tables.limits.drive[0])
         for name, chance in (("commits", 0.3), ("rare commits", 0.01)):
             op = np.where(rng.random(length) < chance, slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
             spread = drive_high - drive_low

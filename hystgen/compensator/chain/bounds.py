@@ -57,7 +57,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
     bent = moving.largest_bend(static, compiled.parts.plays)
     plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
     output = plays * math.prod(one.growth for one in compiled.behind)
-    ends = [abs(float(t.limits.output_min[0])), abs(float(t.limits.output_max[0]))]
+    ends = [abs(float(t.limits.output.low[0])), abs(float(t.limits.output.high[0]))]
     settings = 2.0 * max(ends) * (1 + 3 * t.number_of("clock"))  # a drift has six roundings of its own
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
@@ -66,7 +66,7 @@ def _mapped(compiled: Compiled, u: float, kind: str) -> tuple[float, float, floa
     """Maps of the output: the slope of their inverse at its ends, the roundings of the inverse in terms of its result,
     and the roundings of the maps."""
     limits = compiled.tables.limits
-    ends = np.array([float(limits.output_min[0]), float(limits.output_max[0])]) - compiled.static.output_offset
+    ends = np.array([float(limits.output.low[0]), float(limits.output.high[0])]) - compiled.static.output_offset
     found = MapErrors(ends, 1.0, 0.0, 0.0)
     for each in reversed(compiled.parts.maps):
         found = each.errors(found, u, kind)

@@ -276,7 +276,7 @@ class Bounds:
         """Error of the play sum that the inverse asks for, in output codes."""
         _, slope, back, _ = self._mapped()
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
-        least, most = self.tables.limits.outputs
+        least, most = self.tables.limits.output[0]
         short = max(high - float(most), float(least) - low, 0.0)
         error = slope * (short + (1.0 + self.drifted) * self._signal) + back
         if self.taps:

@@ -58,7 +58,7 @@ from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.effects.plays import FixedMovingTables
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
-from hystgen.plays.slots import Limits
+from hystgen.plays.slots import LimitTable
 
 M = TypeVar("M")
 
@@ -125,7 +125,7 @@ class _Builder:
         limits = self._limits(plays.limits)
         maps = self._maps()
         drive = [end << self.inner.fine for end in self.inner.drive]
-        plays.limits.drive_min[0], plays.limits.drive_max[0] = drive
+        plays.limits.drive.low[0], plays.limits.drive.high[0] = drive
         given = FixedChainTables(
             plays,
             limits,
@@ -264,18 +264,18 @@ class _Builder:
             self._refuse("noncongruent: plays are bent too sharply within their range")
             raise
 
-    def _limits(self, plays: Limits) -> Limits:
+    def _limits(self, plays: LimitTable) -> LimitTable:
         """The limits of the whole chain."""
         limits = plays.copy()
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
         slack = Fraction(1, 1024)  # rounding in double precision may have moved an end off its code by this much
-        limits.output_min[0], limits.output_max[0] = math.ceil(low - slack), math.floor(high + slack)
+        limits.output.low[0], limits.output.high[0] = math.ceil(low - slack), math.floor(high + slack)
         limits.offset[0] = 0
         most = self.about.code_max
-        if limits.output_min[0] < -most or limits.output_max[0] > most:
-            limits.output_min[0] = max(limits.output_min[0], -most)
-            limits.output_max[0] = min(limits.output_max[0], most)
-        if limits.output_max[0] - limits.output_min[0] < 2:
+        if limits.output.low[0] < -most or limits.output.high[0] > most:
+            limits.output.low[0] = max(limits.output.low[0], -most)
+            limits.output.high[0] = min(limits.output.high[0], most)
+        if limits.output.high[0] - limits.output.low[0] < 2:
             message = f"lies so far from 0 that {self.arithmetic} has no codes for the range; move it nearer to 0"
             raise FormatError((("model", "output_offset"), message))
         return limits

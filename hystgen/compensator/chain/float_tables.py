@@ -95,7 +95,7 @@ def build(
     low, high = inward(*output_range(static, parts, seconds), dtype)
     if not low < high:
         raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))
-    plays.limits.output_min[0], plays.limits.output_max[0] = low, high
+    plays.limits.output.low[0], plays.limits.output.high[0] = low, high
 
     turning = parts.turning(static.branches_differ)
     ones = parts.ones(seconds, turning)

@@ -26,7 +26,7 @@ from hystgen.effects.part import One
 from hystgen.effects.plays import FixedMovingTables, MovingTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
-from hystgen.plays.slots import Counts, Limits, Reals
+from hystgen.plays.slots import Counts, LimitTable, Reals
 
 
 class ChainNumbers(Struct):
@@ -106,7 +106,7 @@ class ChainTables(NamedTuple):
     """
 
     plays: Any  # typed in the subclasses, like the other fields of type Any
-    limits: Limits
+    limits: LimitTable
     moving: Any
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # number of blocks in each of these parts

@@ -50,8 +50,8 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     the value at which their effect changes nothing."""
     t, codes = compiled.tables, compiled.codes
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
-    ends = float(t.limits.drive_min[0]) * drive, float(t.limits.drive_max[0]) * drive
-    low, high = (float(end) for end in t.limits.outputs)
+    ends = float(t.limits.drive.low[0]) * drive, float(t.limits.drive.high[0]) * drive
+    low, high = (float(end) for end in t.limits.output[0])
     fastest = compiled.largest_step / (ends[1] - ends[0])
     worst, count = 0.0, 0
     columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.columns}

@@ -13,11 +13,11 @@ from hystgen.plays.slots import HELD, INPUT_CLAMPED
 @jit(inline=True)
 def forward_step(t: Tables, m: Memory, v: Scalar) -> Scalar:
     """Answer one sample."""
-    if not (t.limits.drive_min[0] <= v <= t.limits.drive_max[0]):
+    if not (t.limits.drive.low[0] <= v <= t.limits.drive.high[0]):
         if not (-t.limits.real_max[0] <= v <= t.limits.real_max[0]):
             m.step.status[0] |= HELD
             return m.here.output[0] + t.limits.offset[0]
-        v = t.limits.drive_min[0] if v < t.limits.drive_min[0] else t.limits.drive_max[0]
+        v = t.limits.drive.low[0] if v < t.limits.drive.low[0] else t.limits.drive.high[0]
         m.step.status[0] |= INPUT_CLAMPED
     turn_to(m, v)
     return plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0])) + t.limits.offset[0]

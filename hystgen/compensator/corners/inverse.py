@@ -24,16 +24,16 @@ def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
     x = u - t.limits.offset[0]
     bits = 0
     copy_place(m.undo, m.here)
-    if not (t.limits.output_min[0] <= u <= t.limits.output_max[0]):
+    if not (t.limits.output.low[0] <= u <= t.limits.output.high[0]):
         bits = INPUT_CLAMPED if -t.limits.real_max[0] <= u <= t.limits.real_max[0] else HELD
-        x = (t.limits.output_min[0] if u < t.limits.output_min[0] else t.limits.output_max[0]) - t.limits.offset[0]
+        x = (t.limits.output.low[0] if u < t.limits.output.low[0] else t.limits.output.high[0]) - t.limits.offset[0]
     if bits == HELD:
         if m.step.stepped[0] and m.step.committed[0]:
             move_to_output(t.inverse, m, m.step.returned[0])
     elif m.plays.limited[0] and (x >= m.here.input[0] if m.here.rising[0] else x <= m.here.input[0]):
         bits |= OUTPUT_CLAMPED
     elif x != m.here.input[0] and not move_to_input(t.inverse, m, x):
-        stop_in_block(t.inverse, m, t.limits.drive_max[0] if m.here.rising[0] else t.limits.drive_min[0], x)
+        stop_in_block(t.inverse, m, t.limits.drive.high[0] if m.here.rising[0] else t.limits.drive.low[0], x)
         m.plays.limited[0] = 1
         bits |= OUTPUT_CLAMPED
     m.step.before[0] = m.here.input[0]

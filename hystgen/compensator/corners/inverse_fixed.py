@@ -30,12 +30,12 @@ def inverse_stay(m: FixedMemory) -> None:
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: int) -> None:
     """Make steps usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.here.rising[0]
-    most = inverse_along(m, t.limits.output_max[0] if rising else t.limits.output_min[0])
-    end = (t.limits.drive_max[0] if rising else t.limits.drive_min[0]) << t.limits.fine[0]
+    most = inverse_along(m, t.limits.output.high[0] if rising else t.limits.output.low[0])
+    end = (t.limits.drive.high[0] if rising else t.limits.drive.low[0]) << t.limits.fine[0]
     more = t.slope[m.here.k[0] + 1] * along(m, end - m.here.input[0])
     last = along(m, m.here.output[0]) + more
     usual = ((following if following < last else last) >> t.limits.fraction[0]) - t.limits.shy[0]
-    least = (t.limits.output_min[0] if rising else t.limits.output_max[0]) << t.limits.fraction[0]
+    least = (t.limits.output.low[0] if rising else t.limits.output.high[0]) << t.limits.fraction[0]
     if usual > m.step.next[0] and along(m, m.here.output[0] - least) >= 0:
         m.step.next[0] = usual if usual < most else most
 

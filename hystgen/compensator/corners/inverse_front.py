@@ -60,10 +60,10 @@ def inverse_step(t: Tables, m: Memory, u: Scalar) -> Scalar:
     inverse_keep(m)
     if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = u
-        if u < t.limits.output_min[0]:
-            level = t.limits.output_min[0]
-        elif u > t.limits.output_max[0]:
-            level = t.limits.output_max[0]
+        if u < t.limits.output.low[0]:
+            level = t.limits.output.low[0]
+        elif u > t.limits.output.high[0]:
+            level = t.limits.output.high[0]
         m.step.bits[0] = 0 if level == u else INPUT_CLAMPED
         m.step.reference[0] = u
         w = plays_step(t.inverse, m, level - t.limits.offset[0])

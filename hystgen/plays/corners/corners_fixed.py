@@ -172,7 +172,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: int) -> int:
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
     """The input that gives `to`, an output beyond a kink along the move; at most slightly outside the range."""
     x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
-    most = t.limits.play_max[0] + t.limits.margin[0] if m.here.rising[0] else t.limits.margin[0] - t.limits.play_min[0]
+    most = t.limits.play.high[0] + t.limits.margin[0] if m.here.rising[0] else t.limits.margin[0] - t.limits.play.low[0]
     return along(m, most if x > most else x)
 
 
