@@ -134,7 +134,7 @@ def settling(chain: Chain, within: float) -> Settling:
 
 @dataclass(frozen=True)
 class _Answer:
-    """A step response: seconds until it has settled, its final size, and the seconds over which it was followed."""
+    """A step response: settling time in s, final size, and the time in s for which it was followed."""
 
     seconds: float
     size: float

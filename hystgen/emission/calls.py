@@ -66,7 +66,7 @@ def emit_options(
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
-    """Raise FormatError for code sizes in floating point, where only a quiet drive needs one, its converter's."""
+    """Raise FormatError for code sizes in floating point, where only a quiet drive needs one: that of its converter."""
     emit = model.parameters.emit
     quiet = emit.compensation.quiet and bool(model.effects) and operator != "forward"
     fixed = " or ".join(FIXED)
@@ -149,10 +149,10 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     `source`: a model, a parameter file, a result of `identify` or `diagnose`, or a list of these.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
-    loop; `optimize` auto, speed or size, for the choice by `engine` auto; `layout` self-contained, shared-runtime or
+    loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
     single-header; `allow_partial` leaves out effects that the C cannot include. Missing options come from the file.
     Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
-    UnsupportedEffectsError; then nothing is written.
+    UnsupportedEffectsError, before anything is written.
     """
     return writing.write_files(Path(arguments.path("output", output)), emitted_files(source, **options))
 
