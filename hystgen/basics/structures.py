@@ -51,6 +51,7 @@ Count: TypeAlias = Annotated[NumberArray, "uint_least16_t"]
 SmallCount: TypeAlias = Annotated[NumberArray, "uint_least8_t"]
 TwoReals: TypeAlias = Annotated[NumberArray, "real_t", 2]
 FourInt32: TypeAlias = Annotated[NumberArray, "int32_t", 4]
+FourNarrow: TypeAlias = Annotated[NumberArray, "narrow_t", 4]
 
 
 class Struct(np.ndarray[Any, np.dtype[Any]]):

@@ -409,7 +409,7 @@ _LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 
 def _choices(body: str) -> str:
     """The body without choices between equal values."""
-    return re.sub(r"[\w>-]+ \? ((?:self->)?\w+)\s+: \1(?=[;,)])", r"\1", body)
+    return re.sub(r"[\w>-]+ \? ([^?:;]+?)\s+: \1(?=[;,)])", r"\1", body)
 
 
 def fields(functions: Collection[Function], operator: str) -> frozenset[str]:

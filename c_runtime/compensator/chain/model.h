@@ -8,13 +8,8 @@
 #endif
 #include "compensator/model.h"
 #ifdef HYSTGEN_CHAIN
-#ifdef HYSTGEN_FIXED
-#include "compensator/chain/tables_fixed.h"
-#include "compensator/chain/state_fixed.h"
-#else
 #include "compensator/chain/tables.h"
 #include "compensator/chain/state.h"
-#endif
 #endif
 #ifndef HYSTGEN_CONFIGURED
 
