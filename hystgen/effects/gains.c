@@ -65,8 +65,8 @@ static hystgen_narrow_t hystgen_gain_followed(hystgen_narrow_t gain, hystgen_nar
     hystgen_signal_t inverse = before;
     unsigned int i;
     for (i = 0; i < turns; ++i) {
-        inverse = hystgen_gain_product(
-            inverse, 2 * HYSTGEN_GAIN_ONE - hystgen_gain_product(gain, inverse));
+        inverse = hystgen_gain_product(inverse,
+                                       2 * HYSTGEN_GAIN_ONE - hystgen_gain_product(gain, inverse));
     }
     return (hystgen_narrow_t)inverse;
 }

@@ -172,7 +172,7 @@ class Family(ABC):
         before callers."""
         from hystgen.effects import sources
 
-        blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
+        blocks, drives = sources.files("blocks"), sources.files("drives")
         return (*self.helpers, *blocks, "compensator/chain/drive_signal.c", *drives, "arithmetic/product.c")
 
     @property
@@ -212,6 +212,7 @@ class FloatFamily(Family):
         return {
             "HYSTGEN_APART_IN_FLOAT_CORNERS ": _apart(corners),
             "HYSTGEN_APART_IN_FIXED_CHAIN ": "static inline ",
+            "HYSTGEN_APART_IN_FIXED_BLOCK ": "static ",
             "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
             "HYSTGEN_APART_IN_FIXED ": "static inline ",
             "HYSTGEN_APART_IN_FLOAT ": APART,
@@ -241,6 +242,7 @@ class FixedFamily(Family):
         return {
             "HYSTGEN_APART_IN_FLOAT_CORNERS ": "static ",
             "HYSTGEN_APART_IN_FIXED_CHAIN ": _apart(self.chain, "static inline "),
+            "HYSTGEN_APART_IN_FIXED_BLOCK ": APART,
             "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
             "HYSTGEN_APART_IN_FIXED ": APART,
             "HYSTGEN_APART_IN_FLOAT ": "static ",

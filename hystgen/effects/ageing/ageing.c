@@ -1,5 +1,6 @@
 /* A gain that depends on the distance travelled, in fixed point in drive codes, as a piecewise
-   cubic. Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+   cubic. Called by the functions that emission writes for a chain, see compensator/chain/model.h.
+ */
 #ifndef HYSTGEN_AGEING_AGEING_C
 #define HYSTGEN_AGEING_AGEING_C
 #include "effects/gains.c"

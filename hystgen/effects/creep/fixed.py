@@ -148,7 +148,7 @@ def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTa
     return FixedCreepTables(FixedCreepTable.of(block), first, FixedCreepTerm.of(term))
 
 
-# ---------------------------------------------------------------- creep_fixed.c
+# ---------------------------------------------------------------- creep.c
 
 
 @jit

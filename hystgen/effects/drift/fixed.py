@@ -104,7 +104,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     return high
 
 
-# ---------------------------------------------------------------- clock_fixed.c
+# ---------------------------------------------------------------- clock.c
 
 
 @jit

@@ -150,7 +150,7 @@ def shifted(theta: float, turning: bool = False) -> float:
     return 1.0 + theta + theta**3 / (1.0 - theta + theta * theta)
 
 
-# ---------------------------------------------------------------- lag.c, lag_exact.c
+# ---------------------------------------------------------------- lag.c, exact.c
 
 HALVES = 16
 """[steps] Halvings of the search for a lead. The lead found is at most 2^-16 of the lead too small, which costs less
@@ -198,9 +198,9 @@ class ExactState(Struct):
     before: Real  # input of the last sample
 
 
-KIND = Kind("lag", LagTable, LagState, reading=("solve", "absorb"), own=("rest", "solve", "absorb"))
+KIND = Kind("lag", LagTable, LagState, own=("rest", "solve", "absorb"))
 BRAKED_KIND = replace(KIND, name="braked", state=BrakedState, like=KIND.name)
-EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState)
+EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState, reading=("solve", "absorb"))
 
 
 class LagTables(NamedTuple):
@@ -284,7 +284,7 @@ def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
     return following - t.led.theta[j] * (following - high)
 
 
-# ---------------------------------------------------------------- lag_steady.c
+# ---------------------------------------------------------------- steady.c
 
 
 @jit

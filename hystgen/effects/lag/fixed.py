@@ -18,7 +18,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
-from hystgen.effects.kinds import VERBS, Constants
+from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, shifted, steady_led
 from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
@@ -71,7 +71,7 @@ class FixedExactState(Struct):
     before: Int64  # input of the last sample
 
 
-KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState, reading=VERBS)
+KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState)
 BRAKED_KIND = replace(KIND, name="braked", state=FixedBrakedState, like=KIND.name)
 EXACT_KIND = replace(KIND, name="lag_exact", table=FixedExactTable, state=FixedExactState)
 
@@ -167,7 +167,7 @@ def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTa
     return FixedLagTables(exact, FixedLagTable.of(rows), FixedExactTable.of(rows), about.braked)
 
 
-# ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
+# ---------------------------------------------------------------- lag.c, exact.c
 
 COARSE = 2**30 - 1
 """Largest number in the search for a lead, so that the square of a sum of two such numbers fits in 64 bits."""
@@ -226,7 +226,7 @@ def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
     return nearest(s.led.high[j] - scaled(t.led, j, change, t.led.theta), t.led.bits[j])
 
 
-# ---------------------------------------------------------------- lag_steady_fixed.c
+# ---------------------------------------------------------------- steady.c
 
 
 @jit
@@ -274,7 +274,7 @@ def steady_absorb(s: FixedLagMemory, before: int) -> None:
     """Note that the lag has moved; sums are exact, so no remainder can take it back."""
 
 
-# ---------------------------------------------------------------- braked_fixed.c
+# ---------------------------------------------------------------- braked.c
 
 
 @jit

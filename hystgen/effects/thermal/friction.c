@@ -30,7 +30,7 @@ static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_fr
 
 /* The drive has moved from `before` to v. Returns the sum of the plays' moves, each times the odd
    ratio of its threshold to the first. If a play stays, so do those with larger thresholds. */
-HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t
+HYSTGEN_APART_IN_FIXED_BLOCK hystgen_signal_t
 hystgen_friction_move(const hystgen_friction_table_t *t, hystgen_friction_t *self,
                       hystgen_friction_state_t *state, hystgen_real_t before, hystgen_real_t v) {
     const hystgen_signal_t x = hystgen_friction_input(t, v);

@@ -27,7 +27,7 @@ static hystgen_signal_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v
 }
 
 /* Updates the temperature, gain and offset by the heating of a move of the drive. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_heat_move(const hystgen_heat_table_t *t,
+HYSTGEN_APART_IN_FIXED_BLOCK void hystgen_heat_move(const hystgen_heat_table_t *t,
                                                     hystgen_heat_t *self, hystgen_signal_t amount) {
 #ifdef HYSTGEN_FIXED
     const hystgen_signal_t size = hystgen_nearest(amount, t->coarse);
