@@ -182,6 +182,7 @@ STATES = [
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # no facts, but where Eva is to stop widening, and what it is to look at case by case
+    (r"(    for \(i = 0; i < t->n; \+\+i\) \{\n        const NAME_sum_t r)", r"    /*@ loop unroll 17; */\n\1"),
     (r"(    for \(bits = \w+; bits > 0; bits /= 2u\) \{\n)", r"    /*@ loop unroll 6; */\n\1"),
     (r"(        const bool before = inside < ([^;]*);\n)", r"        /*@ split inside < \2; */\n\1"),
 ]  # fmt: skip

@@ -27,7 +27,7 @@ from hystgen.compensator.chained import Compensator
 from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
 from hystgen.effects.base import Array
-from hystgen.effects.kinds import Kind
+from hystgen.effects.kinds import BlockKind
 from hystgen.emission import own as emitted_own
 from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
@@ -537,7 +537,7 @@ def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
         for kind in (part.coded() if name == "q31" else part.floating).kinds
     ],
 )
-def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: runtime.Family) -> None:
+def test_the_catalogue_s_blocks_are_what_their_c_says(kind: BlockKind, family: runtime.Family) -> None:
     """Type, name and order of numbers in the headers of the run time are those that Python has declared."""
     text = {piece.name: piece.text for piece in runtime._pieces(runtime.CHAIN_TYPES, family.facts)}
     inside = {"lag_t"}  # of another block's memory, in whose place its members stand

@@ -46,7 +46,7 @@ class Gains(NamedTuple):
     """How an arithmetic computes with gains: the product of a signal and a gain, and of two gains; the reciprocal of a
     gain, from the gain 1; the product of a signal and factor j of a table; and a setting as a number of block j.
 
-    `limits`: numbers as in `Limits`.
+    `limits`: numbers as in `GainLimits`.
     """
 
     times: Answer
@@ -57,7 +57,7 @@ class Gains(NamedTuple):
     limits: tuple[float, float, float, float]
 
 
-class Limits(Struct):
+class GainLimits(Struct):
     """The gains 1 and 2, and the limits of a gain that is set: constants that are not in a table in C."""
 
     one: Signal

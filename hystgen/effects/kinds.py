@@ -28,7 +28,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Kind:
+class BlockKind:
     """One kind of block in one arithmetic.
 
     `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, in C preceded by a pointer to its
@@ -60,14 +60,14 @@ class Constants:
     """The constants of one block: its table, a record with the members of `kind.table`, and its rows (m,); `products`:
     multiplications in absorb and in solve; `bits`: fraction bits of its signals beyond the chain's, if finer."""
 
-    kind: Kind
+    kind: BlockKind
     table: Any
     products: tuple[int, int]
     rows: Any = ()
     bits: int = 0
 
 
-def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
+def numbered(kind: BlockKind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
     """A function that returns the constants of all blocks of a kind from their tables. Their verbs take `absorb` and
     `solve` products; absorb takes `each` more per row, and two per Newton step for the reciprocal of a gain."""
 

@@ -18,7 +18,7 @@ from hystgen.plays import slots
 if TYPE_CHECKING:
     from hystgen.basics.structures import Struct
     from hystgen.compensator.chain.layout import ChainTables, Compiled
-    from hystgen.effects.kinds import Constants, Kind
+    from hystgen.effects.kinds import BlockKind, Constants
 
 NUMBERS = {
     "OUTPUT_OFFSET": "added to every displacement",
@@ -39,7 +39,7 @@ class NamedBlock:
     name: str
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> BlockKind:
         """The kind, which names its functions and types."""
         return self.constants.kind
 

@@ -138,7 +138,7 @@ def filled(entries: Iterable[str]) -> str:
 
 
 def entries(values: Iterable[Number], letters: str = "") -> str:
-    """Numbers of a table as written in C; `letters` as in `hystgen.effects.kinds.Kind`, and r for a plain number."""
+    """Numbers of a table as written in C; `letters`: r for a plain number, f for a factor, c for four coefficients."""
     rest = iter(values)
     if not letters:
         return ", ".join(map(literal, rest))
@@ -148,8 +148,6 @@ def entries(values: Iterable[Number], letters: str = "") -> str:
 def _entry(letter: str, rest: Iterator[Number]) -> str:
     if letter == "f":
         return f"{{{literal(next(rest))}, {next(rest)}}}"
-    if letter == "n":
-        return f"{{{_entry('f', rest)}, {next(rest)}, {next(rest)}}}"
     if letter == "c":
         return f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}"
     return literal(next(rest))

@@ -30,14 +30,14 @@ from hystgen.effects.gains import (
     LARGEST_GAIN,
     LEAST_GAIN,
     MOST_CHANGE,
+    GainLimits,
     Gains,
-    Limits,
     following,
     inside,
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -180,7 +180,7 @@ class AgeingTable(Struct):
     turns: SmallCount  # Newton steps for the reciprocal of a gain that has changed
 
 
-class AgeingNumbers(AgeingTable, Limits):
+class AgeingNumbers(AgeingTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 
@@ -194,7 +194,7 @@ class AgeingState(Struct):
     own: Flag  # the gain follows the travel
 
 
-KIND = Kind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
+KIND = BlockKind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
 
 
 class AgeingTables(NamedTuple):

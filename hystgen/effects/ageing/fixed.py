@@ -19,7 +19,7 @@ from hystgen.effects.gains import (
     LEAST_GAIN,
     ONE,
     RECIPROCAL_ERROR,
-    Limits,
+    GainLimits,
     newton_steps,
 )
 from hystgen.effects.kinds import Rows, numbered
@@ -52,7 +52,7 @@ class FixedAgeingTable(AgeingTable):
     bits: UInt8  # of a gain below the code that sets it
 
 
-class FixedAgeingNumbers(FixedAgeingTable, Limits):
+class FixedAgeingNumbers(FixedAgeingTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 

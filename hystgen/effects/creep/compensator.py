@@ -14,7 +14,7 @@ from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, firsts, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, Rows, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, zero
 
@@ -154,7 +154,7 @@ class CreepState(Struct):
     ahead: Real  # output of the next sample for an input of 0
 
 
-KIND = Kind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))
+KIND = BlockKind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))
 
 
 class CreepTables(NamedTuple):

@@ -19,7 +19,7 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.creep.compensator import CreepNumbers
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Counts, zero
@@ -59,7 +59,7 @@ class FixedCreepState(Struct):
     ahead: Int64  # output of the next sample for the same input
 
 
-KIND = Kind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
+KIND = BlockKind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
 
 
 class FixedCreepTables(NamedTuple):

@@ -8,7 +8,7 @@ from hystgen.basics.jit import Action, Answer, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import zero
 
@@ -44,7 +44,7 @@ class ClockState(Struct):
     lead: Real  # samples by which the next reference is ahead
 
 
-KIND = Kind("clock", ClockTable, ClockState, own=())
+KIND = BlockKind("clock", ClockTable, ClockState, own=())
 
 
 def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, ahead: int) -> tuple[float, ...]:

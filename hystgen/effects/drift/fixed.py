@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import zero
 
@@ -52,7 +52,7 @@ class FixedClockState(Struct):
     count: Int64  # samples since the start
 
 
-KIND = Kind("clock", FixedClockTable, FixedClockState, own=())
+KIND = BlockKind("clock", FixedClockTable, FixedClockState, own=())
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from hystgen.basics.jit import N, Scalar, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Block, Place, decays
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import BlockKind, Constants
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, zero
@@ -198,7 +198,7 @@ class ExactState(Struct):
     before: Real  # input of the last sample
 
 
-KIND = Kind("lag", LagTable, LagState, own=("rest", "solve", "absorb"))
+KIND = BlockKind("lag", LagTable, LagState, own=("rest", "solve", "absorb"))
 BRAKED_KIND = replace(KIND, name="braked", state=BrakedState, like=KIND.name)
 EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState, reading=("solve", "absorb"))
 

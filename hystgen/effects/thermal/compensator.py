@@ -17,14 +17,14 @@ from hystgen.effects.gains import (
     LARGEST_GAIN,
     LEAST_GAIN,
     MOST_CHANGE,
+    GainLimits,
     Gains,
-    Limits,
     following,
     inside,
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import Constants, Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, Constants, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -55,7 +55,7 @@ class GainTable(Struct):
     hottest: Real
 
 
-class GainNumbers(GainTable, Limits):
+class GainNumbers(GainTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 
@@ -67,7 +67,7 @@ class GainState(Struct):
     offset: Signal
 
 
-KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
+KIND = BlockKind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class HeatTable(Struct):
     turns: Count  # Newton steps for the reciprocal of a gain that has changed
 
 
-class HeatNumbers(HeatTable, Limits):
+class HeatNumbers(HeatTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 
@@ -191,7 +191,7 @@ class HeatState(Struct):
     offset: Real
 
 
-HEAT_KIND = Kind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
+HEAT_KIND = BlockKind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
 
 
 class FrictionPlay(Struct):
@@ -225,7 +225,7 @@ class FrictionState(Struct):
     begun: Flag  # the plays have positions
 
 
-FRICTION_KIND = Kind(
+FRICTION_KIND = BlockKind(
     "friction", FrictionTable, FrictionState, Rows("play", FrictionPlay, FrictionPlayState), reading=(), own=()
 )
 
@@ -475,7 +475,7 @@ def heat_verbs(
 
 # ---------------------------------------------------------------- friction.c
 
-def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
+def friction_constants(t: Any, kind: BlockKind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
     """The rubbing plays of each block, with `each` products per play; None if the block has none."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])

@@ -18,7 +18,7 @@ from hystgen.effects.gains import (
     LEAST_GAIN,
     ONE,
     RECIPROCAL_ERROR,
-    Limits,
+    GainLimits,
     inside,
     newton_steps,
 )
@@ -62,7 +62,7 @@ class FixedGainTable(Struct):
     bits: UInt8  # of a temperature below a code
 
 
-class FixedGainNumbers(FixedGainTable, Limits):
+class FixedGainNumbers(FixedGainTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 
@@ -140,7 +140,7 @@ class FixedHeatTable(Struct):
     drop: UInt8  # and bits that products with the temperature drop
 
 
-class FixedHeatNumbers(FixedHeatTable, Limits):
+class FixedHeatNumbers(FixedHeatTable, GainLimits):
     """The same with constants that are not in the table in C."""
 
 
