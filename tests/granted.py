@@ -154,7 +154,7 @@ STATES = [
     (r"(NAME_sum_t NAME_mode_absorb\([^{]*\{\n)",
      r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->off, MODE);\n"
      r"    WITHIN(self->rate, MODE);\n"),
-    (r"(    const int64_t change = \(int64_t\)sample\[[^;]*;\n)    return ([^;]*);",
+    (r"(    const NAME_sum_t change = \(NAME_sum_t\)sample\[[^;]*;\n)    return ([^;]*);",
      r"\1    const int64_t between = \2;\n    WITHIN(between, CODE);\n    return (NAME_reach_t)between;"),
     (r"(        const int64_t part = self->part[^;]*;\n)", CLOCK + r"\1"),
     (r"(    const int64_t more = \(t->slope[^;]*;\n)", CLOCK + r"\1"),

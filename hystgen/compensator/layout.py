@@ -10,7 +10,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
 from hystgen.plays.corners.corners_float import Curve, Memory, Start, new_memory
-from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals
+from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals, inside
 
 
 class Tables(NamedTuple):
@@ -114,21 +114,13 @@ class Limited(Protocol):
 @jit(inline=True)
 def clamp_drive(t: Limited, v: N) -> N:
     """v limited to the input range."""
-    if v < t.limits[DRIVE_MIN]:
-        return t.limits[DRIVE_MIN]
-    if v > t.limits[DRIVE_MAX]:
-        return t.limits[DRIVE_MAX]
-    return v
+    return inside(v, t.limits[DRIVE_MIN], t.limits[DRIVE_MAX])
 
 
 @jit(inline=True)
 def inverse_clamp(t: Limited, u: N) -> N:
     """u limited to the output range."""
-    if u < t.limits[OUTPUT_MIN]:
-        return t.limits[OUTPUT_MIN]
-    if u > t.limits[OUTPUT_MAX]:
-        return t.limits[OUTPUT_MAX]
-    return u
+    return inside(u, t.limits[OUTPUT_MIN], t.limits[OUTPUT_MAX])
 
 
 # ---------------------------------------------------------------- before the first move

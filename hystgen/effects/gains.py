@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple, Protocol
 
-from hystgen.arithmetic.factors import times
-from hystgen.basics.jit import Answer, N, Scalar, jit
+from hystgen.arithmetic.factors import multiplied, times
+from hystgen.basics.jit import Action, Answer, Scalar, jit
 from hystgen.basics.structures import Factor, NumberArray, Signal, Struct
+from hystgen.effects.kinds import TwoParts
+from hystgen.plays.slots import zero
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 """[times] A gain is kept between these: a gain beyond them that the caller sets is due to a faulty sensor or a wrong
@@ -44,7 +46,8 @@ def newton_steps(change: float, roundoff: float) -> int:
 
 class Gains(NamedTuple):
     """How an arithmetic computes with gains: the product of a signal and a gain, and of two gains; the reciprocal of a
-    gain, from the gain 1; the product of a signal and factor j of a table; and a setting as a number of block j.
+    gain, from the gain 1; the product of a signal and factor j of a table; a setting, or any number in floating point,
+    as a number of block j; and an action that sets what a block counts, in floating point in two parts.
 
     `limits`: numbers as in `GainLimits`.
     """
@@ -54,6 +57,7 @@ class Gains(NamedTuple):
     reciprocal: Answer
     scaled: Answer
     given: Answer
+    put: Action
     limits: tuple[float, float, float, float]
 
 
@@ -64,14 +68,6 @@ class GainLimits(Struct):
     two: Signal
     least: Signal
     largest: Signal
-
-
-@jit
-def inside(x: N, least: N, largest: N) -> N:
-    """A number within limits."""
-    if x < least:
-        return least
-    return largest if x > largest else x
 
 
 def following(by: Gains) -> Answer:
@@ -99,16 +95,17 @@ def _reciprocal(one: Scalar, gain: Scalar) -> Scalar:
 
 
 @jit(inline=True)
-def _scaled(x: Scalar, factors: NumberArray, j: int) -> Scalar:
-    return factors[j] * x
-
-
-@jit(inline=True)
 def _given(t: Struct, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
     return x
 
 
-FLOATING = Gains(_times, _times, _reciprocal, _scaled, _given, (1.0, 2.0, LEAST_GAIN, LARGEST_GAIN))
+@jit
+def _put(s: TwoParts, j: int, x: Scalar) -> None:
+    s.high[j] = x
+    s.low[j] = zero(x)
+
+
+FLOATING = Gains(_times, _times, _reciprocal, multiplied, _given, _put, (1.0, 2.0, LEAST_GAIN, LARGEST_GAIN))
 
 
 @jit
@@ -136,6 +133,11 @@ def _fixed_given(t: _Coded, j: int, x: int) -> int:
     return x << t.bits[j]
 
 
+@jit
+def _fixed_put(s: TwoParts, j: int, x: int) -> None:
+    s.high[j] = x
+
+
 class _Coded(Protocol):
     """A table with the bits of a number below the code that sets it."""
 
@@ -143,6 +145,6 @@ class _Coded(Protocol):
 
 
 FIXED = Gains(
-    _fixed_times, _fixed_product, _fixed_reciprocal, _fixed_scaled, _fixed_given,
+    _fixed_times, _fixed_product, _fixed_reciprocal, _fixed_scaled, _fixed_given, _fixed_put,
     (ONE, 2 * ONE, int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)),
 )

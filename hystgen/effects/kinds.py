@@ -9,13 +9,51 @@ import textwrap
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from hystgen.basics.jit import Answer, Jit, Scalar, jit
-from hystgen.basics.structures import Struct
+from hystgen.basics.structures import NumberArray, Struct
+from hystgen.plays.slots import Counts
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
+
+
+class TwoParts(Protocol):
+    """Numbers in two parts, since their steps may be far smaller than their last bit."""
+
+    high: NumberArray
+    low: NumberArray
+
+
+@jit
+def added(s: TwoParts, j: int, change: Scalar) -> Scalar:
+    """Add to number j in two parts. Returns its upper part."""
+    high = s.high[j]
+    change = change + s.low[j]
+    following: Scalar = high + change
+    s.high[j] = following
+    s.low[j] = change - (following - high)
+    return following
+
+
+B = TypeVar("B", bound=Struct)
+R = TypeVar("R", bound=Struct)
+
+
+class RowedTables(NamedTuple, Generic[B, R]):
+    """All blocks of a kind with rows: `block` (k,), the rows of each from `first` (k + 1) on in `row` (m,)."""
+
+    block: B
+    first: Counts
+    row: R
+
+
+class RowedMemory(NamedTuple, Generic[B, R]):
+    """Memory of all blocks of a kind with rows: `block` (k,), `row` (m,)."""
+
+    block: B
+    row: R
 
 
 @dataclass(frozen=True)
@@ -73,7 +111,7 @@ def numbered(kind: BlockKind, absorb: int, solve: int = 0, each: int = 0) -> Cal
 
     def constants(t: Any) -> Iterator[Constants]:
         for j, row in enumerate(t if isinstance(t, Struct) else t.block):
-            rows = getattr(t, kind.rows.name)[t.first[j] : t.first[j + 1]] if kind.rows else ()
+            rows = t.row[t.first[j] : t.first[j + 1]] if kind.rows else ()
             turns = int(row["turns"]) if "turns" in row.dtype.names else 0
             yield Constants(kind, row, (absorb + each * len(rows) + 2 * turns, solve), rows)
 

@@ -242,12 +242,8 @@ class Form(ABC):
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
-    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
-        """The weights of the references that are summed."""
-
-    @abstractmethod
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
-        """The fractional step of a delay, as tables and macros."""
+    def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
+        """An array of factors."""
 
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:

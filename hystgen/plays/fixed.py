@@ -19,6 +19,7 @@ from hystgen.plays.slots import (
     PLAY_MIN,
     SATURATED,
     Reals,
+    inside,
 )
 
 
@@ -60,11 +61,7 @@ def code(t: FixedPlayTables, total: int) -> tuple[int, int]:
     """Output code of a sum, limited to the type, and its status bits."""
     found = nearest(total, t.limits[FRACTION])
     bits = OUTPUT_CLAMPED if found > t.limits[SATURATED] or found < -t.limits[SATURATED] else 0
-    if found > t.limits[CODE_MAX]:
-        return t.limits[CODE_MAX], bits
-    if found < -t.limits[CODE_MAX]:
-        return -t.limits[CODE_MAX], bits
-    return found, bits
+    return inside(found, -t.limits[CODE_MAX], t.limits[CODE_MAX]), bits
 
 
 @jit

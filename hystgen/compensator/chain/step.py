@@ -42,6 +42,7 @@ from hystgen.plays.slots import (
     ZERO,
     Counts,
     Reals,
+    inside,
 )
 
 (CLOCK,) = map(PARTS.index, BESIDE)
@@ -482,14 +483,10 @@ def made_of(
         if not finite(t, d):
             s.plays.step.status[0] |= HELD
             return
-        inside = d
-        if inside > t.number.farthest_offset[0]:
-            inside = t.number.farthest_offset[0]
-        elif inside < -t.number.farthest_offset[0]:
-            inside = -t.number.farthest_offset[0]
-        if inside != d:
+        within = inside(d, -t.number.farthest_offset[0], t.number.farthest_offset[0])
+        if within != d:
             s.plays.step.status[0] |= LIMITED_SETTING
-        s.own.offset[0] = inside
+        s.own.offset[0] = within
 
     @jit
     def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:

@@ -6,7 +6,6 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,11 +32,10 @@ from hystgen.effects.gains import (
     GainLimits,
     Gains,
     following,
-    inside,
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import BlockKind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, RowedTables, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -51,7 +49,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import inside, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
@@ -66,24 +64,25 @@ float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times 
 `0.05/2.3 * 6/384 * 0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
 
 
+def losses(effect: ExponentialAgeing | SeveralAgeing) -> list[tuple[float, float]]:
+    """The losses that come to an end, each with its travel."""
+    if isinstance(effect, ExponentialAgeing):
+        return [(effect.loss, effect.travel)]
+    return list(zip(effect.losses, effect.travels, strict=True))
+
+
 def gain(effect: Ageing, travelled: float) -> float:
     """The gain after a travel in input units."""
     if isinstance(effect, LogarithmicAgeing):
         return 1.0 - effect.loss * math.log10(1.0 + min(travelled / effect.travel, 1e300))
-    if isinstance(effect, ExponentialAgeing):
-        return 1.0 + effect.loss * math.expm1(-travelled / effect.travel)
-    pairs = zip(effect.losses, effect.travels, strict=True)
-    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
+    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in losses(effect))
 
 
 def steepness(effect: Ageing, travelled: float) -> float:
     """Change of the gain per input unit of travel."""
     if isinstance(effect, LogarithmicAgeing):
         return -effect.loss / (math.log(10.0) * (effect.travel + travelled))
-    if isinstance(effect, ExponentialAgeing):
-        return -effect.loss / effect.travel * math.exp(-travelled / effect.travel)
-    pairs = zip(effect.losses, effect.travels, strict=True)
-    return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
+    return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in losses(effect))
 
 
 class AgeingPiece(Struct):
@@ -100,8 +99,7 @@ def pieces(effect: Ageing) -> AgeingPiece:
 
     Each piece matches the gain's values and slopes at its ends and is as long as TABLE_ERROR allows.
     """
-    several = isinstance(effect, SeveralAgeing)
-    travels = effect.travels if several else (effect.travel,)  # type: ignore[union-attr]
+    travels = [effect.travel] if isinstance(effect, LogarithmicAgeing) else [travel for _, travel in losses(effect)]
     last = max(travels) * 10.0**DECADES if isinstance(effect, LogarithmicAgeing) else 20.0 * max(travels)
     rows = []
     at, length = 0.0, 0.25 * min(travels)
@@ -197,12 +195,7 @@ class AgeingState(Struct):
 KIND = BlockKind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
 
 
-class AgeingTables(NamedTuple):
-    """All ageing of a model: `block` (k,), the pieces of each from `first` (k + 1) on in `piece` (m,)."""
-
-    block: AgeingNumbers
-    first: Counts
-    piece: AgeingPiece
+AgeingTables = RowedTables[AgeingNumbers, AgeingPiece]
 
 
 def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
@@ -243,14 +236,8 @@ class UnevenAgeing:
 @jit
 def along(t: AgeingTables, k: int, travel: Scalar) -> Scalar:
     """The place of a travel in piece k, from 0 on; past the last piece it stays at the end."""
-    share = (travel - t.piece.begin[k]) * t.piece.share[k]
+    share = (travel - t.row.begin[k]) * t.row.share[k]
     return t.block.one[0] if share > t.block.one[0] else share
-
-
-@jit(inline=True)
-def part_of(gain: Scalar, share: Scalar) -> Scalar:
-    """A gain times a place in a piece."""
-    return gain * share
 
 
 @jit
@@ -266,18 +253,10 @@ def travel_on(t: AgeingTables, s: AgeingState, j: int, way: Scalar) -> None:
     s.low[j] = change - (following - high)
 
 
-@jit
-def set_out(s: AgeingState, j: int, travel: Scalar) -> None:
-    """Set the travel."""
-    s.high[j] = travel
-    s.low[j] = zero(travel)
-
-
-def verbs(
-    by: Gains, state: type[Struct], along: Answer, part_of: Answer, travel_on: Action, set_out: Action
-) -> Verbs:
-    """The verbs of ageing in an arithmetic: from the functions of that name above."""
-    followed, times, reciprocal, given = following(by), by.times, by.reciprocal, by.given
+def verbs(by: Gains, state: type[Struct], along: Answer, part_of: Answer, travel_on: Action) -> Verbs:
+    """The verbs of ageing in an arithmetic: from the functions of that name above; `part_of`: a gain times a place in a
+    piece."""
+    followed, times, reciprocal, given, put = following(by), by.times, by.reciprocal, by.given, by.put
 
     @jit
     def gain_at(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
@@ -286,21 +265,21 @@ def verbs(
         high = t.first[j + 1]
         while high - low > 1:
             middle = (low + high) // 2
-            if travel >= t.piece.begin[middle]:
+            if travel >= t.row.begin[middle]:
                 low = middle
             else:
                 high = middle
         share = along(t, low, travel)
-        gain: Scalar = t.piece.c[low, 3]
+        gain: Scalar = t.row.c[low, 3]
         for k in range(2, -1, -1):
-            gain = part_of(gain, share) + t.piece.c[low, k]
+            gain = part_of(gain, share) + t.row.c[low, k]
         return gain
 
     @jit
     def set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -> bool:
         """Set the travel. Returns whether it had to be limited."""
         taken = inside(travel, zero(t.block.last[j]), t.block.last[j])
-        set_out(s, j, taken)
+        put(s, j, taken)
         s.own[j] = 1
         s.gain[j] = gain_at(t, j, taken)
         s.inverse[j] = reciprocal(t.block.one[j], s.gain[j])
@@ -351,7 +330,7 @@ def verbs(
 
 
 ARITHMETIC = Realized(
-    verbs(FLOATING, AgeingState, along, part_of, travel_on, set_out), numbered(KIND, 5, 1), tables, kinds=(KIND,)
+    verbs(FLOATING, AgeingState, along, FLOATING.product, travel_on), numbered(KIND, 5, 1), tables, kinds=(KIND,)
 )
 
 PART = ChainPart(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
@@ -22,9 +21,9 @@ from hystgen.effects.gains import (
     GainLimits,
     newton_steps,
 )
-from hystgen.effects.kinds import Rows, numbered
+from hystgen.effects.kinds import RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
 """Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""
@@ -70,12 +69,7 @@ KIND = replace(
 )
 
 
-class FixedAgeingTables(NamedTuple):
-    """All ageing of a model, as in floating point."""
-
-    block: FixedAgeingNumbers
-    first: Counts
-    piece: FixedAgeingPiece
+FixedAgeingTables = RowedTables[FixedAgeingNumbers, FixedAgeingPiece]
 
 
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
@@ -135,8 +129,8 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgei
 @jit
 def along(t: FixedAgeingTables, k: int, travel: int) -> int:
     """As in floating point."""
-    on = (travel - t.piece.begin[k]) >> t.piece.drop[k]
-    share = times(on, t.piece.share.mantissa[k], t.piece.share.shift[k])
+    on = (travel - t.row.begin[k]) >> t.row.drop[k]
+    share = times(on, t.row.share.mantissa[k], t.row.share.shift[k])
     return zero(share) + (1 << SHARE_BITS) if share > 1 << SHARE_BITS else share
 
 
@@ -153,13 +147,7 @@ def travel_on(t: FixedAgeingTables, s: FixedAgeingState, j: int, way: int) -> No
     s.high[j] = t.block.last[j] if following > t.block.last[j] else following
 
 
-@jit
-def set_out(s: FixedAgeingState, j: int, travel: int) -> None:
-    """Set the travel."""
-    s.high[j] = travel
-
-
 ARITHMETIC = Realized(
-    floating.verbs(FIXED, FixedAgeingState, along, part_of, travel_on, set_out),
+    floating.verbs(FIXED, FixedAgeingState, along, part_of, travel_on),
     numbered(KIND, 8, 2), made, formats, kinds=(KIND,),
 )

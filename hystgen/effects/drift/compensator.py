@@ -10,7 +10,7 @@ from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
-from hystgen.plays.slots import zero
+from hystgen.plays.slots import inside, zero
 
 # ---------------------------------------------------------------- clock.c
 
@@ -77,11 +77,7 @@ def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Scalar) -> Scalar
     """The drift `ahead` samples after the present one."""
     time = s.high[j] * t.block[j] + (s.low[j] + ahead) * t.sample[j]
     drift = (t.rate[j] + t.half_change[j] * time) * time
-    if drift > t.farthest[j]:
-        return t.farthest[j]
-    if drift < -t.farthest[j]:
-        return -t.farthest[j]
-    return drift
+    return inside(drift, -t.farthest[j], t.farthest[j])
 
 
 def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Answer) -> Verbs:

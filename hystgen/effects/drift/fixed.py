@@ -16,7 +16,7 @@ from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
-from hystgen.plays.slots import zero
+from hystgen.plays.slots import inside, zero
 
 MOST_SAMPLES = 2**44
 """Maximum number of samples counted: half a year at 1 MHz. A drift that is then still in range stays constant."""
@@ -134,11 +134,7 @@ def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) ->
     """The drift `ahead` samples after the present one."""
     more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
     drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])
-    if drift > t.farthest[j]:
-        return t.farthest[j]
-    if drift < -t.farthest[j]:
-        return -t.farthest[j]
-    return drift
+    return inside(drift, -t.farthest[j], t.farthest[j])
 
 
 def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockFormats:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hystgen.basics.jit import Action, Answer, N, Scalar, jit
+from hystgen.basics.jit import Answer, N, Scalar, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, firsts, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import (
@@ -20,11 +20,10 @@ from hystgen.effects.gains import (
     GainLimits,
     Gains,
     following,
-    inside,
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import BlockKind, Constants, Rows, numbered
+from hystgen.effects.kinds import B, BlockKind, Constants, Rows, added, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -40,7 +39,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts, inside, zero
 
 # ---------------------------------------------------------------- gain.c
 
@@ -235,22 +234,29 @@ largest rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rat
 the error in that test, with 16 it is 5.3 times."""
 
 
-class HeatTables(NamedTuple):
+F = TypeVar("F", bound=Struct)
+
+
+class RubbingTables(NamedTuple, Generic[B, F]):
     """Own heat of a model: `block` (k,); `friction` (k,), without plays if the drive's square is the heat; `play` (m,):
     the rubbing plays, those of each block from `first` (k + 1) on."""
 
-    block: HeatNumbers
-    friction: FrictionNumbers
+    block: B
+    friction: F
     first: Counts
     play: FrictionPlay
 
 
-class HeatMemory(NamedTuple):
+class RubbingMemory(NamedTuple, Generic[B]):
     """Memory of all blocks: `block` (k,), and of the rubbing plays, `friction` (k,) and `play` (m,)."""
 
-    block: HeatState
+    block: B
     friction: FrictionState
     play: FrictionPlayState
+
+
+HeatTables = RubbingTables[HeatNumbers, FrictionNumbers]
+HeatMemory = RubbingMemory[HeatState]
 
 
 def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
@@ -407,43 +413,20 @@ def heat_way(before: N, v: N) -> N:
 @jit
 def warmed(t: HeatNumbers, s: HeatState, j: int, amount: Scalar) -> Scalar:
     """Take the heat of a step. Returns the temperature rise."""
-    high = s.high[j]
-    change = (t.per_amount[j] * amount - t.rate[j] * high) + s.low[j]
-    found: Scalar = high + change
-    s.high[j] = found
-    s.low[j] = change - (found - high)
-    return found
-
-
-@jit
-def cooled(s: HeatState, j: int) -> None:
-    """Return to the temperature of the surroundings."""
-    s.high[j] = zero(s.offset[j])
-    s.low[j] = zero(s.offset[j])
-
-
-@jit(inline=True)
-def narrowed(t: HeatNumbers, j: int, gain: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
-    """A gain that its temperature keeps within limits, but for rounding."""
-    return gain
-
-
-@jit(inline=True)
-def friction_input(t: FrictionNumbers, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
-    """A drive as a position of the plays."""
-    return v
+    return added(s, j, t.per_amount[j] * amount - t.rate[j] * s.high[j])
 
 
 def heat_verbs(
-    by: Gains, memory: Callable[..., object], warmed: Answer, cooled: Action, narrowed: Answer, entered: Answer
+    by: Gains, memory: Callable[..., object], warmed: Answer, narrowed: Answer, entered: Answer
 ) -> Verbs:
-    """The verbs of own heat in an arithmetic: from the functions of that name above, and `friction_input`."""
-    times, scaled, followed, rub = by.times, by.scaled, following(by), friction_move(entered)
+    """The verbs of own heat in an arithmetic. `warmed`: as above; `narrowed`: a gain within limits from which rounding
+    may have taken it; `entered`: a drive as a position of the rubbing plays."""
+    times, scaled, put, followed, rub = by.times, by.scaled, by.put, following(by), friction_move(entered)
 
     @jit
     def reset(t: HeatTables, s: HeatMemory, j: int) -> None:
         """Return to the temperature of the surroundings."""
-        cooled(s.block, j)
+        put(s.block, j, zero(t.block.one[j]))
         s.block.gain[j] = t.block.one[j]
         s.block.inverse[j] = t.block.one[j]
         s.block.offset[j] = zero(t.block.one[j])
@@ -485,7 +468,7 @@ def friction_constants(t: Any, kind: BlockKind = FRICTION_KIND, each: int = 1) -
 def friction_move(entered: Answer) -> Answer:
     """A function that moves the drive to v; at first the plays rest at `before`. It returns the sum of their moves,
     each times its threshold as an odd multiple of the first. If a play stays, so do those with larger thresholds.
-    `entered`: as `friction_input`."""
+    `entered`: a drive as a position of the plays."""
 
     @jit
     def move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
@@ -556,7 +539,7 @@ class UnevenHeat:
 
 ARITHMETIC = Realized(gain_verbs(FLOATING), numbered(KIND, 1, 1), tables, kinds=(KIND,))
 HEAT_ARITHMETIC = Realized(
-    heat_verbs(FLOATING, memory_of(HeatMemory), warmed, cooled, narrowed, friction_input),
+    heat_verbs(FLOATING, memory_of(HeatMemory), warmed, FLOATING.given, FLOATING.given),
     numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
@@ -19,7 +19,6 @@ from hystgen.effects.gains import (
     ONE,
     RECIPROCAL_ERROR,
     GainLimits,
-    inside,
     newton_steps,
 )
 from hystgen.effects.kinds import numbered
@@ -28,14 +27,14 @@ from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     FrictionNumbers,
     FrictionPlay,
-    FrictionPlayState,
-    FrictionState,
     FrictionTable,
+    RubbingMemory,
+    RubbingTables,
     Warm,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import inside
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain that is linear in a temperature: one product."""
@@ -169,21 +168,8 @@ class FixedFrictionNumbers(FixedFrictionTable, FrictionNumbers):
 FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
 
 
-class FixedHeatTables(NamedTuple):
-    """Own heat of a model, as in floating point."""
-
-    block: FixedHeatNumbers
-    friction: FixedFrictionNumbers
-    first: Counts
-    play: FrictionPlay
-
-
-class FixedHeatMemory(NamedTuple):
-    """Memory of all blocks, as in floating point."""
-
-    block: FixedHeatState
-    friction: FrictionState
-    play: FrictionPlayState
+FixedHeatTables = RubbingTables[FixedHeatNumbers, FixedFrictionNumbers]
+FixedHeatMemory = RubbingMemory[FixedHeatState]
 
 
 @dataclass(frozen=True)
@@ -268,12 +254,6 @@ def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
 
 
 @jit
-def cooled(s: FixedHeatState, j: int) -> None:
-    """Return to the temperature of the surroundings."""
-    s.high[j] = zero(s.high[j])
-
-
-@jit
 def narrowed(t: FixedHeatNumbers, j: int, gain: int) -> int:
     """A gain within limits, from which rounding may have taken it."""
     return inside(gain, t.least[j], t.largest[j])
@@ -284,7 +264,7 @@ STATE_BITS = 31
 
 ARITHMETIC = Realized(floating.gain_verbs(FIXED), numbered(KIND, 2, 2), made, formats, kinds=(KIND,))
 HEAT_ARITHMETIC = Realized(
-    floating.heat_verbs(FIXED, memory_of(FixedHeatMemory), warmed, cooled, narrowed, FIXED.given),
+    floating.heat_verbs(FIXED, memory_of(FixedHeatMemory), warmed, narrowed, FIXED.given),
     numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
     functools.partial(floating.friction_constants, kind=FRICTION_KIND, each=2),
 )
