@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import N, Scalar, jit
+from hystgen.basics.jit import N, Scalar, inside, jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
 from hystgen.plays.corners.corners_float import Curve, Memory, Start, new_memory
-from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals, inside
+from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals
 
 
 class Tables(NamedTuple):

@@ -9,10 +9,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.front.curve import curve
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Reals, inside
+from hystgen.plays.slots import Reals
 
 
 class BendPiece(Protocol):

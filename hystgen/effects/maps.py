@@ -11,10 +11,10 @@ import numpy as np
 
 from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.effects.base import Array, Effect, Run
 from hystgen.effects.bend import Bends, bend
-from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals, inside
+from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
 
 
 class MapErrors(NamedTuple):

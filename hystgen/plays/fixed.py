@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.plays.loop import PlayTables, State, loop_output
 from hystgen.plays.slots import (
     CODE_MAX,
@@ -19,7 +19,6 @@ from hystgen.plays.slots import (
     PLAY_MIN,
     SATURATED,
     Reals,
-    inside,
 )
 
 

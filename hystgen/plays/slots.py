@@ -59,9 +59,3 @@ class StepState(Struct):
 def zero(x: N) -> N:
     """0 in the type of x, which is finite."""
     return x - x
-
-
-@jit(inline=True)
-def inside(x: N, least: N, most: N) -> N:
-    """x within limits."""
-    return least if x < least else most if x > most else x

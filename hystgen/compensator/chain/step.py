@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, inside, jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
@@ -42,7 +42,6 @@ from hystgen.plays.slots import (
     ZERO,
     Counts,
     Reals,
-    inside,
 )
 
 (CLOCK,) = map(PARTS.index, BESIDE)

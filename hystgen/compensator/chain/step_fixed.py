@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hystgen.arithmetic.factors import paired, times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
 from hystgen.compensator.chain.layout import REST_BITS, TRAVEL_BITS, FixedChainTables
@@ -20,7 +20,7 @@ from hystgen.compensator.layout import FixedTables
 from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
-from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, inside
+from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
 

@@ -9,7 +9,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, N, Scalar, jit
+from hystgen.basics.jit import Answer, N, Scalar, inside, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, firsts, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import (
@@ -39,7 +39,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, inside, zero
+from hystgen.plays.slots import Counts, zero
 
 # ---------------------------------------------------------------- gain.c
 

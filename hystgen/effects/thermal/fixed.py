@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.gains import (
     FIXED,
@@ -34,7 +34,6 @@ from hystgen.effects.thermal.compensator import (
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import inside
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain that is linear in a temperature: one product."""
