@@ -18,7 +18,6 @@ from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, STEADY, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
-from hystgen.basics.structures import memory_of
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, moving, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
@@ -659,8 +658,10 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
     effect = effect.model_copy(update={"gain_per_degree": -0.002, "offset_per_degree": 0.01})
     row, thresholds = thermal.heat_numbers(effect, ends, 20.0, seconds), thermal.thresholds(effect, ends)
     one = thermal_fixed.heat(row, 4, thresholds, largest, lsb, 2.0**20, about.code_bits)
-    t = thermal_fixed.heat_tables([one])
-    state = memory_of(thermal_fixed.FixedHeatMemory)(t, np.int64)
+    t, verbs = thermal_fixed.heat_tables([one]), thermal_fixed.HEAT_ARITHMETIC.verbs
+    assert verbs.reset
+    assert verbs.move
+    state = verbs.memory(t, np.int64)
     rng = np.random.default_rng(bits)
     steps = rng.integers(-largest // 50, largest // 50, 2000)
     v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops hardly rub
@@ -672,21 +673,21 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
     rise, before, peak, worst = 0, 0, 0, 0.0
     r, z = np.array(thresholds) / lsb, np.zeros(len(thresholds))
     with jit.plain():
-        thermal_fixed.heat_reset(t, state, 0)
+        verbs.reset(t, state, 0)
         for each in v.tolist():
-            thermal_fixed.heat_move(t, state, 0, np.int64(before), np.int64(each))
+            verbs.move(t, state, 0, np.int64(before), np.int64(each))
             way = abs(each * abs(each) - before * abs(before))
             if rubs:
                 moved = np.clip(z, each - r, each + r)
                 way, z = Fraction(float((2 * np.arange(len(r)) + 1) @ np.abs(moved - z))), moved
             rise += round(way * heated * 2**100 - rise * rate)
-            worst = max(worst, abs(int(state.block.rise[0]) * unit - rise / 2**100))
+            worst = max(worst, abs(int(state.block.high[0]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each
         assert worst <= one.error < 0.1 * peak / 2**100
         warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # even from there the state stays within what proofs assume
-        state.block.rise[0] = warmest
-        thermal_fixed.heat_move(t, state, 0, np.int64(-largest), np.int64(largest))
-        assert 0 <= state.block.rise[0] <= warmest
+        state.block.high[0] = warmest
+        verbs.move(t, state, 0, np.int64(-largest), np.int64(largest))
+        assert 0 <= state.block.high[0] <= warmest
 
 
 @pytest.mark.parametrize(("level", "centre"), [(15.0, 4.0), (6.0, -8.0)])

@@ -293,9 +293,9 @@ EFFECT_FAULTS = [
     ("aged", r"\(travel - piece->begin\) >> piece->drop", "travel - piece->begin", "signed downcast"),
     ("drifted", r"(\(t->slope \+ self->gained\)) \* ahead", r"\1 * self->part", "signed overflow"),
     ("heated", r"amount, t->coarse", "amount, 0", "signed downcast"),
-    ("rubbed", r"(2u \* i \+ 1u\)) \* way", r"\1 * way * way", "signed overflow"),
+    ("rubbed", r"(\(\w+_sum_t\)odd) \* way", r"\1 * way * way", "signed overflow"),
     ("viscous", r"(sum \+= t->weight\[i\] \* z);", r"\1 * r;", "signed overflow"),
-    ("braked", r"\(int64_t\)(\(middle \+ margin\) \* \(middle)", r"\1", "signed overflow"),
+    ("braked", r"\(\w+_sum_t\)(\(middle \+ margin\) \* \(middle)", r"\1", "signed overflow"),
     ("dashpot", r"\(k = 4; k > 0; --k\)( \{\s*y = piece)", r"(k = 5; k > 0; --k)\1", "out of bounds"),
 ]  # fmt: skip
 

@@ -1,10 +1,9 @@
-/* Products of whole numbers with non-integer constants, in fixed point. Called by all blocks in
-   fixed point. */
+/* Products of signals with non-integer constants. Called by all blocks. */
 #ifndef HYSTGEN_ARITHMETIC_FACTORS_C
 #define HYSTGEN_ARITHMETIC_FACTORS_C
-#include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 
+#ifdef HYSTGEN_FIXED
 /* Bits of the lower part of a number, which is multiplied separately. */
 #define HYSTGEN_LOW_PART 20u
 
@@ -23,5 +22,11 @@ static int64_t hystgen_short_times(int64_t x, const hystgen_factor_t *f) {
     const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
     return (((x * f->mantissa) >> HYSTGEN_LOW_PART) + ((int64_t)1 << (shift - 1u))) >> shift;
 }
+#else
+/* x times a factor. */
+static inline hystgen_signal_t hystgen_times(hystgen_signal_t x, const hystgen_factor_t *f) {
+    return *f * x;
+}
+#endif
 
 #endif

@@ -39,12 +39,14 @@ typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
 #endif
 
-/* In a model with effects, signal: a value between blocks, in fixed point wider than a code; fine:
-   the output of the drive side, in fixed point finer than a code; travel: the distance covered by
-   the drive. Without effects, and in floating point, all of them have the caller's type; only the
-   loop engine's signals in fixed point have the type of its play sums. */
+/* In a model with effects, signal: a value between blocks, in fixed point wider than a code; narrow:
+   a number of a block with half its bits; fine: the output of the drive side, in fixed point finer
+   than a code; travel: the distance covered by the drive; factor: multiplies a signal. Without
+   effects, and in floating point, all of them have the caller's type; only the loop engine's
+   signals in fixed point have the type of its play sums. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
+typedef int32_t hystgen_narrow_t;
 typedef hystgen_play_t hystgen_fine_t;
 typedef hystgen_sum_t hystgen_travel_t;
 #else
@@ -53,9 +55,13 @@ typedef hystgen_sum_t hystgen_signal_t;
 #else
 typedef hystgen_real_t hystgen_signal_t;
 #endif
+typedef hystgen_real_t hystgen_narrow_t;
 typedef hystgen_real_t hystgen_fine_t;
 typedef hystgen_real_t hystgen_travel_t;
 typedef hystgen_real_t hystgen_number_t;
+#ifndef HYSTGEN_FIXED
+typedef hystgen_real_t hystgen_factor_t;
+#endif
 #define HYSTGEN_FINE_MIN HYSTGEN_DRIVE_MIN
 #define HYSTGEN_FINE_MAX HYSTGEN_DRIVE_MAX
 #define hystgen_clamp_fine hystgen_clamp_drive
@@ -70,6 +76,7 @@ typedef hystgen_real_t hystgen_number_t;
 #define HYSTGEN_APART_IN_FLOAT_CORNERS HYSTGEN_APART
 #define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
 #define HYSTGEN_APART_IN_FIXED_CHAIN HYSTGEN_APART
+#define HYSTGEN_APART_IN_FIXED_BLOCK HYSTGEN_APART
 #define HYSTGEN_APART_IN_CHAIN HYSTGEN_APART
 #ifndef HYSTGEN_CHAIN
 #define HYSTGEN_ALONE

@@ -20,9 +20,9 @@ class Arithmetic(ABC):
     NAME_real_t; `number_name`, `bytes`: numpy's name and the size of that type; `finer`: the arithmetic to use if this
     one is too coarse; empty if there is none.
 
-    The same for all arithmetics of a kind: `fixed`: whether numbers are codes; `unused`: keys for code sizes in the
-    `emit` section that do not apply; `includes`: C headers needed; `travels`: factor from an argument to a travel,
-    above 1 where travels have more bits than codes.
+    Shared by a kind of arithmetic: `fixed`: whether numbers are codes; `unused`: keys for code sizes in the `emit`
+    section that do not apply; `one_curve`: whether all stages of a memoryless part are one curve; `includes`: C headers
+    needed; `travels`: factor from an argument to a travel, above 1 where travels have more bits than codes.
     """
 
     name: str
@@ -33,6 +33,7 @@ class Arithmetic(ABC):
     finer: str = ""
 
     fixed: ClassVar[bool]
+    one_curve: ClassVar[bool]
     unused: ClassVar[tuple[str, ...]]
     includes: ClassVar[tuple[str, ...]]
     travels: ClassVar[int]

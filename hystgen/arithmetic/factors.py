@@ -1,11 +1,12 @@
-"""Products of whole numbers with non-integer constants, in fixed point: `c_runtime/arithmetic/factors.c`."""
+"""Products with constants; in fixed point, of whole numbers with non-integer ones: `c_runtime/arithmetic/factors.c`."""
 
 from __future__ import annotations
 
 import math
 from fractions import Fraction
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.structures import NumberArray
 
 LOW_BITS = 20
 """Number of low bits that are multiplied separately; the upper part then has 31 bits, and both products fit into 64."""
@@ -65,3 +66,15 @@ def times(x: int, mantissa: int, shift: int) -> int:
     low = x & ((1 << LOW_BITS) - 1)
     whole = high * mantissa + ((low * mantissa) >> LOW_BITS)
     return (whole + (1 << (shift - LOW_BITS - 1))) >> (shift - LOW_BITS)
+
+
+@jit
+def paired(x: int, factors: NumberArray, j: int) -> int:
+    """x times factor j of an array of mantissas and shifts."""
+    return times(x, factors[j, 0], factors[j, 1])
+
+
+@jit(inline=True)
+def multiplied(x: Scalar, factors: NumberArray, j: int) -> Scalar:
+    """The same in floating point, with an array of numbers."""
+    return factors[j] * x

@@ -30,7 +30,7 @@ class Fixed(Arithmetic):
     play_bits: int = 0
     low_bits: int = 0
 
-    fixed = True
+    fixed = one_curve = True
     includes = ("stdbool", "stddef", "stdint")
     travels = 1 << 16
     unused = ()

@@ -19,7 +19,7 @@ class Floating(Arithmetic):
 
     float_h: str = ""
 
-    fixed = False
+    fixed = one_curve = False
     includes = ("float", "stdbool", "stddef", "stdint")
     travels = 1
     unused = ("drive_lsb", "output_lsb")

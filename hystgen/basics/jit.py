@@ -268,3 +268,9 @@ def _listen() -> None:
 
     register: Callable[[str, event.Listener], None] = event.register
     register("numba:compile", FirstCompilation())
+
+
+@jit(inline=True)
+def inside(x: N, least: N, most: N) -> N:
+    """x within limits."""
+    return least if x < least else most if x > most else x

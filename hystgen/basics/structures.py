@@ -51,6 +51,7 @@ Count: TypeAlias = Annotated[NumberArray, "uint_least16_t"]
 SmallCount: TypeAlias = Annotated[NumberArray, "uint_least8_t"]
 TwoReals: TypeAlias = Annotated[NumberArray, "real_t", 2]
 FourInt32: TypeAlias = Annotated[NumberArray, "int32_t", 4]
+FourNarrow: TypeAlias = Annotated[NumberArray, "narrow_t", 4]
 
 
 class Struct(np.ndarray[Any, np.dtype[Any]]):
@@ -131,11 +132,13 @@ def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
     `kind`: a structure, made once per entry of the tables; or a NamedTuple of structures, each made once per entry of
     the tables' field of the same name.
     """
+    named = get_origin(kind) or kind
+    given = dict(zip(getattr(named, "__parameters__", ()), get_args(kind), strict=True))
 
     def memory(t: Any, real: DTypeLike) -> Any:
-        if issubclass(kind, Struct):
-            return kind.zeros(len(t), real)
-        fields = get_type_hints(kind).items()
-        return kind(*(each.zeros(len(getattr(t, name)), real) for name, each in fields))
+        if issubclass(named, Struct):
+            return named.zeros(len(t), real)
+        fields = get_type_hints(named).items()
+        return named(*(given.get(each, each).zeros(len(getattr(t, name)), real) for name, each in fields))
 
     return memory

@@ -62,7 +62,7 @@ def kind(cascade: StaticModel, arithmetic: str) -> str:
     if not cascade.stages:
         return "pi"
     tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]
-    front = "dead_zone" if ARITHMETICS[arithmetic].fixed or not any(tanh) else "tanh" if all(tanh) else "mixed"
+    front = "dead_zone" if ARITHMETICS[arithmetic].one_curve or not any(tanh) else "tanh" if all(tanh) else "mixed"
     return f"{front}_branches" if cascade.branches_differ else front
 
 

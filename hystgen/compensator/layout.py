@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import N, Scalar, jit
+from hystgen.basics.jit import N, Scalar, inside, jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
@@ -114,21 +114,13 @@ class Limited(Protocol):
 @jit(inline=True)
 def clamp_drive(t: Limited, v: N) -> N:
     """v limited to the input range."""
-    if v < t.limits.drive.low[0]:
-        return t.limits.drive.low[0]
-    if v > t.limits.drive.high[0]:
-        return t.limits.drive.high[0]
-    return v
+    return inside(v, t.limits.drive.low[0], t.limits.drive.high[0])
 
 
 @jit(inline=True)
 def inverse_clamp(t: Limited, u: N) -> N:
     """u limited to the output range."""
-    if u < t.limits.output.low[0]:
-        return t.limits.output.low[0]
-    if u > t.limits.output.high[0]:
-        return t.limits.output.high[0]
-    return u
+    return inside(u, t.limits.output.low[0], t.limits.output.high[0])
 
 
 # ---------------------------------------------------------------- before the first move

@@ -4,6 +4,7 @@ operator in double precision, over sampled signals."""
 from __future__ import annotations
 
 import functools
+import importlib
 from collections.abc import Iterable
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,53 +31,58 @@ if TYPE_CHECKING:
 
 class Engines(NamedTuple):
     """One kind of arithmetic: the functions of its memoryless part, and its forward and inverse operators in the loop
-    engine and in the corner engine, the latter without and with a memoryless part."""
+    engine and in the corner engine, the latter without and with a memoryless part; `chain`: the module of its models
+    with effects."""
 
+    chain: str
     front: ModuleType
     loop: tuple[Operations, Operations]
     corners: tuple[tuple[Operations, Operations], tuple[Operations, Operations]]
 
 
+def _engines(t: Tables | FixedTables | ChainTables) -> Engines:
+    """The engines of the arithmetic of the tables."""
+    return _engines_of(t.fixed)
+
+
 @functools.cache
-def _engines(fixed: bool) -> Engines:
+def _engines_of(fixed: bool) -> Engines:
     """The engines in floating point or in fixed point, imported only when a model needs them."""
     if not fixed:
         corners = (forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)
-        return Engines(compensator, step_float.OPERATIONS, corners)
+        return Engines("step_float", compensator, step_float.OPERATIONS, corners)
     from hystgen.compensator import step_fixed
     from hystgen.compensator.corners import forward_fixed, inverse_fixed, inverse_front_fixed
     from hystgen.front import curve
 
     forwards = forward_fixed.OPERATIONS
     corners = (forwards, inverse_fixed.OPERATIONS), (forwards, inverse_front_fixed.OPERATIONS)
-    return Engines(curve, step_fixed.OPERATIONS, corners)
+    return Engines("step_fixed", curve, step_fixed.OPERATIONS, corners)
 
 
 def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
     """The module with the functions of the memoryless part, in the arithmetic of the tables."""
-    return _engines(t.fixed).front
+    return _engines(t).front
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
     """The functions of one operator in the bit reference, for the arithmetic and engine of the tables."""
-    fixed = t.fixed
+    found = _engines(t)
     if isinstance(t, Tables | FixedTables):
-        found = _engines(fixed)
         return (found.loop if t.engine == LOOP else found.corners[t.has_front])[inverse]
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-    return _chain_operations(fixed, t.plays.engine == LOOP, drives, outputs)[inverse]
+    return _chain_operations(found.chain, t.plays.engine == LOOP, drives, outputs)[inverse]
 
 
 @functools.cache
 def _chain_operations(
-    fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+    module: str, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
 ) -> tuple[Operations, Operations]:
     from hystgen.compensator.chain import step as chain_step
-    from hystgen.compensator.chain import step_fixed, step_float
 
-    own = step_fixed if fixed else step_float
+    own = importlib.import_module(f"hystgen.compensator.chain.{module}")
     return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
@@ -105,7 +111,7 @@ def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[A
 
 def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]:
     """The given numbers, rounded to the nearest that a call accepts as arguments."""
-    if t.fixed:
+    if t.threshold.dtype.kind == "i":
         most = int(t.limits.code_max[0])
         x = np.clip(np.rint(x), -most - 1, most)
     return np.array(x, dtype=t.threshold.dtype)

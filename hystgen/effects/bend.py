@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.front.curve import curve
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals
@@ -62,9 +62,5 @@ def bends(
 def bend(t: Bends, which: int, x: int) -> tuple[int, int]:
     """The value of a curve at x, and whether x had to be limited to its ends."""
     argument = nearest(x, t.scaled[which, 0])
-    inside = argument
-    if inside < t.domain[which, 0]:
-        inside = t.domain[which, 0]
-    elif inside > t.domain[which, 1]:
-        inside = t.domain[which, 1]
-    return curve(t, which, inside) << t.scaled[which, 1], 1 if inside != argument else 0
+    within = inside(argument, t.domain[which, 0], t.domain[which, 1])
+    return curve(t, which, within) << t.scaled[which, 1], 1 if within != argument else 0

@@ -18,11 +18,6 @@
 #ifdef HYSTGEN_HAS_QUIET_DRIVE
 #include "effects/lag/quiet.c"
 #endif
-#ifdef HYSTGEN_FIXED
-#include "effects/lag/steady_fixed.c"
-#include "effects/lag/braked_fixed.c"
-#else
 #include "effects/lag/steady.c"
 #include "effects/lag/braked.c"
-#endif
 #endif

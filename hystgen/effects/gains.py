@@ -1,10 +1,15 @@
-"""Gains behind the plays that vary: their limits, and in fixed point their reciprocals, as in `gains.c`."""
+"""Gains behind the plays that vary: their limits and reciprocals, as in `gains.c`."""
 
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple, Protocol
 
-from hystgen.basics.jit import jit
+from hystgen.arithmetic.factors import multiplied, times
+from hystgen.basics.jit import Action, Answer, Scalar, jit
+from hystgen.basics.structures import Factor, NumberArray, Signal, Struct
+from hystgen.effects.kinds import TwoParts
+from hystgen.plays.slots import zero
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 """[times] A gain is kept between these: a gain beyond them that the caller sets is due to a faulty sensor or a wrong
@@ -19,7 +24,6 @@ GAIN_BITS = 29
 """Fraction bits of a gain in fixed point: 2 is the largest, and mantissas have 31."""
 
 ONE = 1 << GAIN_BITS
-LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
 
 RECIPROCAL_ERROR = 4.0 * 2.0**-GAIN_BITS
 """[share of the signal] Error of the reciprocal of a gain of at least 1/2 that is off by its last bit: twice the gain's
@@ -40,18 +44,107 @@ def newton_steps(change: float, roundoff: float) -> int:
 # ---------------------------------------------------------------- gains.c
 
 
-@jit
-def reciprocal(gain: int) -> int:
-    """1 over a gain."""
-    return ((1 << (2 * GAIN_BITS)) + (gain >> 1)) // gain
+class Gains(NamedTuple):
+    """How an arithmetic computes with gains: the product of a signal and a gain, and of two gains; the reciprocal of a
+    gain, from the gain 1; the product of a signal and factor j of a table; a setting, or any number in floating point,
+    as a number of block j; and an action that sets what a block counts, in floating point in two parts.
+
+    `limits`: numbers as in `GainLimits`.
+    """
+
+    times: Answer
+    product: Answer
+    reciprocal: Answer
+    scaled: Answer
+    given: Answer
+    put: Action
+    limits: tuple[float, float, float, float]
+
+
+class GainLimits(Struct):
+    """The gains 1 and 2, and the limits of a gain that is set: constants that are not in a table in C."""
+
+    one: Signal
+    two: Signal
+    least: Signal
+    largest: Signal
+
+
+def following(by: Gains) -> Answer:
+    """A function for the reciprocal of a gain that has changed, by `turns` Newton steps from the previous one."""
+    product = by.product
+
+    @jit
+    def followed(gain: Scalar, before: Scalar, two: Scalar, turns: int) -> Scalar:
+        inverse = before
+        for _ in range(turns):
+            inverse = product(inverse, two - product(gain, inverse))
+        return inverse
+
+    return followed
+
+
+@jit(inline=True)
+def _times(x: Scalar, gain: Scalar) -> Scalar:
+    return gain * x
+
+
+@jit(inline=True)
+def _reciprocal(one: Scalar, gain: Scalar) -> Scalar:
+    return one / gain
+
+
+@jit(inline=True)
+def _given(t: Struct, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
+    return x
 
 
 @jit
-def followed(gain: int, before: int, turns: int) -> int:
-    """The reciprocal of a gain that has changed, by Newton steps from the previous reciprocal."""
-    half = 1 << (GAIN_BITS - 1)
-    inverse = before
-    for _ in range(turns):
-        product = (gain * inverse + half) >> GAIN_BITS
-        inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
-    return inverse
+def _put(s: TwoParts, j: int, x: Scalar) -> None:
+    s.high[j] = x
+    s.low[j] = zero(x)
+
+
+FLOATING = Gains(_times, _times, _reciprocal, multiplied, _given, _put, (1.0, 2.0, LEAST_GAIN, LARGEST_GAIN))
+
+
+@jit
+def _fixed_times(x: int, gain: int) -> int:
+    return times(x, gain, GAIN_BITS)
+
+
+@jit
+def _fixed_product(a: int, b: int) -> int:
+    return (a * b + (1 << (GAIN_BITS - 1))) >> GAIN_BITS
+
+
+@jit
+def _fixed_reciprocal(one: int, gain: int) -> int:
+    return ((one << GAIN_BITS) + (gain >> 1)) // gain
+
+
+@jit
+def _fixed_scaled(x: int, factors: Factor, j: int) -> int:
+    return times(x, factors.mantissa[j], factors.shift[j])
+
+
+@jit
+def _fixed_given(t: _Coded, j: int, x: int) -> int:
+    return x << t.bits[j]
+
+
+@jit
+def _fixed_put(s: TwoParts, j: int, x: int) -> None:
+    s.high[j] = x
+
+
+class _Coded(Protocol):
+    """A table with the bits of a number below the code that sets it."""
+
+    bits: NumberArray
+
+
+FIXED = Gains(
+    _fixed_times, _fixed_product, _fixed_reciprocal, _fixed_scaled, _fixed_given, _fixed_put,
+    (ONE, 2 * ONE, int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)),
+)

@@ -9,13 +9,51 @@ import textwrap
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from hystgen.basics.jit import Answer, Jit, Scalar, jit
-from hystgen.basics.structures import Struct
+from hystgen.basics.structures import NumberArray, Struct
+from hystgen.plays.slots import Counts
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
+
+
+class TwoParts(Protocol):
+    """Numbers in two parts, since their steps may be far smaller than their last bit."""
+
+    high: NumberArray
+    low: NumberArray
+
+
+@jit
+def added(s: TwoParts, j: int, change: Scalar) -> Scalar:
+    """Add to number j in two parts. Returns its upper part."""
+    high = s.high[j]
+    change = change + s.low[j]
+    following: Scalar = high + change
+    s.high[j] = following
+    s.low[j] = change - (following - high)
+    return following
+
+
+B = TypeVar("B", bound=Struct)
+R = TypeVar("R", bound=Struct)
+
+
+class RowedTables(NamedTuple, Generic[B, R]):
+    """All blocks of a kind with rows: `block` (k,), the rows of each from `first` (k + 1) on in `row` (m,)."""
+
+    block: B
+    first: Counts
+    row: R
+
+
+class RowedMemory(NamedTuple, Generic[B, R]):
+    """Memory of all blocks of a kind with rows: `block` (k,), `row` (m,)."""
+
+    block: B
+    row: R
 
 
 @dataclass(frozen=True)
@@ -28,7 +66,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Kind:
+class BlockKind:
     """One kind of block in one arithmetic.
 
     `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, in C preceded by a pointer to its
@@ -60,20 +98,20 @@ class Constants:
     """The constants of one block: its table, a record with the members of `kind.table`, and its rows (m,); `products`:
     multiplications in absorb and in solve; `bits`: fraction bits of its signals beyond the chain's, if finer."""
 
-    kind: Kind
+    kind: BlockKind
     table: Any
     products: tuple[int, int]
     rows: Any = ()
     bits: int = 0
 
 
-def numbered(kind: Kind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
+def numbered(kind: BlockKind, absorb: int, solve: int = 0, each: int = 0) -> Callable[[Any], Iterator[Constants]]:
     """A function that returns the constants of all blocks of a kind from their tables. Their verbs take `absorb` and
     `solve` products; absorb takes `each` more per row, and two per Newton step for the reciprocal of a gain."""
 
     def constants(t: Any) -> Iterator[Constants]:
         for j, row in enumerate(t if isinstance(t, Struct) else t.block):
-            rows = getattr(t, kind.rows.name)[t.first[j] : t.first[j + 1]] if kind.rows else ()
+            rows = t.row[t.first[j] : t.first[j + 1]] if kind.rows else ()
             turns = int(row["turns"]) if "turns" in row.dtype.names else 0
             yield Constants(kind, row, (absorb + each * len(rows) + 2 * turns, solve), rows)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.effects.base import Array, Effect, Run
 from hystgen.effects.bend import Bends, bend
 from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
@@ -144,12 +144,8 @@ class MapTables(NamedTuple):
 @jit
 def straight(t: MapTables, j: int, x: int, slope: int) -> int:
     """x, with another slope beyond the ends."""
-    inside = x
-    if inside < t.piece[j, LOWER]:
-        inside = t.piece[j, LOWER]
-    elif inside > t.piece[j, UPPER]:
-        inside = t.piece[j, UPPER]
-    return inside + times(x - inside, t.piece[j, slope], t.piece[j, slope + 1])
+    within = inside(x, t.piece[j, LOWER], t.piece[j, UPPER])
+    return within + times(x - within, t.piece[j, slope], t.piece[j, slope + 1])
 
 
 @jit

@@ -28,7 +28,7 @@ from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
 from hystgen.basics.structures import Number, Signal, declared
 from hystgen.effects.base import USER, Array, Block, Effect, Place
-from hystgen.effects.kinds import Kind, OwnBlock, product
+from hystgen.effects.kinds import BlockKind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
 """Number of arguments of each function."""
@@ -41,14 +41,14 @@ WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 
 
 @functools.cache
-def kind(effect: type[Effect]) -> Kind:
+def kind(effect: type[Effect]) -> BlockKind:
     """The kind of an effect's block."""
     assert effect.block is not None
     table, state = effect.block.table, effect.block.state
     called = _name(effect)
     shape = str(effect.model_fields["shape"].annotation.__args__[0]) if not called.startswith(USER) else ""  # type: ignore[union-attr]
     name = f"{called}_{shape}" if shape else f"user_{called.partition(':')[2]}"
-    return Kind(name, declared(f"{name}_table", table, Number), declared(name, state, Signal))
+    return BlockKind(name, declared(f"{name}_table", table, Number), declared(name, state, Signal))
 
 
 def source(effect: type[Effect]) -> Path:

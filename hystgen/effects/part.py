@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import Action, Answer, Check, Scalar
 from hystgen.effects.base import Array, Block, Effect, Place
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import BlockKind, Constants
 
 Function = Callable[..., Any]
 
@@ -335,7 +335,7 @@ class Realized:
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
-    kinds: tuple[Kind, ...] = ()
+    kinds: tuple[BlockKind, ...] = ()
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 

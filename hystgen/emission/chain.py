@@ -18,7 +18,7 @@ from hystgen.plays import slots
 if TYPE_CHECKING:
     from hystgen.basics.structures import Struct
     from hystgen.compensator.chain.layout import ChainTables, Compiled
-    from hystgen.effects.kinds import Constants, Kind
+    from hystgen.effects.kinds import BlockKind, Constants
 
 NUMBERS = {
     "OUTPUT_OFFSET": "added to every displacement",
@@ -39,7 +39,7 @@ class NamedBlock:
     name: str
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> BlockKind:
         """The kind, which names its functions and types."""
         return self.constants.kind
 
@@ -197,12 +197,10 @@ def effects(
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "drive samples held in the delay"))
-    if t.of("wait").samples:
-        waited, share = form.waited(t, writer)
-        tables += waited * ("forward" in operators)
-        constants += share
+    if "forward" in operators and t.of("wait").samples:
+        tables.append(form.factors("waited", t.of("wait").share, writer))
     if "inverse" in operators and len(t.tap):
-        tables.append(form.tap(t, writer))
+        tables.append(form.factors("tap", t.tap, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
         ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest alternates"),

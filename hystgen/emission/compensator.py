@@ -137,7 +137,7 @@ def filled(entries: Iterable[str]) -> str:
 
 
 def entries(values: Iterable[Number], letters: str = "") -> str:
-    """Numbers of a table as written in C; `letters` as in `hystgen.effects.kinds.Kind`, and r for a plain number."""
+    """Numbers of a table as written in C; `letters`: r for a plain number, f for a factor, c for four coefficients."""
     rest = iter(values)
     if not letters:
         return ", ".join(map(literal, rest))
@@ -147,8 +147,6 @@ def entries(values: Iterable[Number], letters: str = "") -> str:
 def _entry(letter: str, rest: Iterator[Number]) -> str:
     if letter == "f":
         return f"{{{literal(next(rest))}, {next(rest)}}}"
-    if letter == "n":
-        return f"{{{_entry('f', rest)}, {next(rest)}, {next(rest)}}}"
     if letter == "c":
         return f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}"
     return literal(next(rest))
@@ -243,12 +241,8 @@ class Form(ABC):
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
-    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
-        """The weights of the references that are summed."""
-
-    @abstractmethod
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
-        """The fractional step of a delay, as tables and macros."""
+    def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
+        """An array of factors."""
 
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:
@@ -292,7 +286,7 @@ class Form(ABC):
 
 
 def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Limits of drive and output."""
+    """LimitTable of drive and output."""
     ends = [operand(x) for x in (*numbers.limits.drive[0], *numbers.limits.output[0])]
     return (ends[0], ends[1]), (ends[2], ends[3])
 

@@ -208,11 +208,8 @@ class FixedForm(Form):
         degrees: float = t.of("gain").reference[0].item() / 2.0**thermal.TEMPERATURE_BITS
         return degrees
 
-    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
-        return _factors("tap", t.tap, writer)
-
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
-        return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
+    def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
+        return _factors(own, rows, writer)
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [

@@ -35,6 +35,7 @@ from hystgen.front.stage import StageTables
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Start
+from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
@@ -141,11 +142,8 @@ class FloatingForm(Form):
 
         return float(t.of("gain").reference[0])
 
-    def tap(self, t: ChainTables, writer: Writer) -> ConstantTable:
-        return writer.array("real_t", "tap", list(t.tap))
-
-    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
-        return [], [("WAITED", operand(t.of("wait").share[0]), "elapsed part of the step after the oldest sample")]
+    def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
+        return writer.array("real_t", own, list(rows))
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         undo = [Field("place_t", "undo", "place of the plays before the solution")] * inverse

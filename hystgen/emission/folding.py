@@ -17,7 +17,7 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
         "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
-        "HYSTGEN_APART ")
+        "HYSTGEN_APART_IN_FIXED_BLOCK ", "HYSTGEN_APART ")
 """First words of functions that only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
 """Text before and after a whole argument, initializer or answer."""
@@ -409,7 +409,7 @@ _LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 
 def _choices(body: str) -> str:
     """The body without choices between equal values."""
-    return re.sub(r"[\w>-]+ \? ((?:self->)?\w+)\s+: \1(?=[;,)])", r"\1", body)
+    return re.sub(r"[\w>-]+ \? ([^?:;]+?)\s+: \1(?=[;,)])", r"\1", body)
 
 
 def fields(functions: Collection[Function], operator: str) -> frozenset[str]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from hystgen.basics.problems import EffectsError, printable
 from hystgen.effects import own
 from hystgen.effects.base import Effect
-from hystgen.effects.kinds import VERBS, Kind
+from hystgen.effects.kinds import VERBS, BlockKind
 from hystgen.emission.runtime import Piece
 from hystgen.emission.text import WIDTH
 
@@ -183,7 +183,7 @@ def _end(code: str, begin: int) -> int:
     return len(code)
 
 
-def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
+def _of_pieces(text: str, found: list[Piece], kind: BlockKind) -> Iterator[tuple[int, str]]:
     """Problems with a block's types and functions: missing, wrong or superfluous ones."""
     own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
@@ -245,7 +245,7 @@ def _bare(declared: str) -> str:
     return re.sub(r"\s+", "", re.sub(r"const (hystgen_\w+ \*self)", r"\1", declared))
 
 
-def _declared(kind: Kind) -> Iterator[tuple[str, str]]:
+def _declared(kind: BlockKind) -> Iterator[tuple[str, str]]:
     """Names of a block's types and functions, and their declarations."""
     name = f"hystgen_{kind.name}"
     for own_type, struct in ((f"{name}_table_t", kind.table), (f"{name}_t", kind.state)):

@@ -38,9 +38,12 @@ FLOAT_KERNELS = (
     "plays/loop_solve.c",
 )
 CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
-FIXED_CHAIN_TYPES = ("compensator/chain/tables_fixed.h", "compensator/chain/state_fixed.h")
+"""The types of effects."""
+HELPERS = ("arithmetic/factors.c", "effects/gains.c")
+"""Functions that several effects call, in every arithmetic."""
 SIGNALS = {
-    "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
+    "hystgen_signal_t": "hystgen_sum_t", "hystgen_narrow_t": "int32_t", "hystgen_fine_t": "hystgen_play_t",
+    "hystgen_travel_t": "hystgen_sum_t",
 }
 """Types of signals between blocks in fixed point with effects. Elsewhere they are the types of codes, but in engine
 loop without effects signals are as wide as sums of the plays."""
@@ -54,8 +57,8 @@ FINE = {
 SUMS = ("play_t", "reach_t", "sum_t")
 """Types of plays; in floating point every number has the same type."""
 
-NUMBER = "hystgen_number_t"
-"""The type of factors in a user's own block; in floating point an ordinary number."""
+FACTORS = ("hystgen_number_t", "hystgen_factor_t")
+"""The types of factors in a user's own block and in the catalogue's; in floating point ordinary numbers."""
 
 FIXED_KERNELS = (
     "arithmetic/division.c",
@@ -75,11 +78,10 @@ class Family(ABC):
     without effects in engine loop.
 
     `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: of file names
-    that have none in floating point; `chain_types`: files with the types of effects; `helpers`: with functions that
-    several effects call; `curves`: with a memoryless part whose stages are not called one by one; `codes`: with codes;
-    `moves_apart`: whether moving and bending plays takes less stack in separate functions; `opening`: headers before
-    all code of a file; in a single header they stand between `opening_apart` and `closing`, so that they do not affect
-    the code that includes it.
+    that have none in floating point; `helpers`: with functions that several effects call; `curves`: with a memoryless
+    part whose stages are not called one by one; `codes`: with codes; `moves_apart`: whether moving and bending plays
+    takes less stack in separate functions; `opening`: headers before all code of a file; in a single header they stand
+    between `opening_apart` and `closing`, so that they do not affect the code that includes it.
     """
 
     arithmetic: Arithmetic
@@ -90,10 +92,9 @@ class Family(ABC):
     form: ClassVar[str]
     ending: ClassVar[str]
     moves_apart: ClassVar[bool]
-    chain_types: ClassVar[tuple[str, ...]]
     curves: ClassVar[tuple[str, ...]]
     codes: ClassVar[tuple[str, ...]]
-    helpers: ClassVar[tuple[str, ...]] = ()
+    helpers: ClassVar[tuple[str, ...]] = HELPERS
     opening: ClassVar[tuple[str, ...]] = ()
     opening_apart: ClassVar[tuple[str, ...]] = ()
     closing: ClassVar[tuple[str, ...]] = ()
@@ -132,7 +133,7 @@ class Family(ABC):
     @property
     def signals(self) -> dict[str, str]:
         """Names in code that models with and without effects share, and what they stand for here."""
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
+        return dict.fromkeys((*SIGNALS, *FACTORS), "hystgen_real_t") | FINE
 
     @property
     def casts(self) -> bool:
@@ -171,7 +172,7 @@ class Family(ABC):
         before callers."""
         from hystgen.effects import sources
 
-        blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
+        blocks, drives = sources.files("blocks"), sources.files("drives")
         return (*self.helpers, *blocks, "compensator/chain/drive_signal.c", *drives, "arithmetic/product.c")
 
     @property
@@ -192,7 +193,7 @@ class FloatFamily(Family):
     """Floating point: one type for every number."""
 
     kind, form, ending, moves_apart = "float", "floating", "", False
-    chain_types, curves, codes = CHAIN_TYPES, (), ()
+    curves, codes = (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
     closing = ("arithmetic/rounding_end.h",)
@@ -211,6 +212,7 @@ class FloatFamily(Family):
         return {
             "HYSTGEN_APART_IN_FLOAT_CORNERS ": _apart(corners),
             "HYSTGEN_APART_IN_FIXED_CHAIN ": "static inline ",
+            "HYSTGEN_APART_IN_FIXED_BLOCK ": "static ",
             "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
             "HYSTGEN_APART_IN_FIXED ": "static inline ",
             "HYSTGEN_APART_IN_FLOAT ": APART,
@@ -223,7 +225,7 @@ class FixedFamily(Family):
     """Fixed point."""
 
     kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", True
-    chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
+    helpers = (*HELPERS, "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
     @property
@@ -240,6 +242,7 @@ class FixedFamily(Family):
         return {
             "HYSTGEN_APART_IN_FLOAT_CORNERS ": "static ",
             "HYSTGEN_APART_IN_FIXED_CHAIN ": _apart(self.chain, "static inline "),
+            "HYSTGEN_APART_IN_FIXED_BLOCK ": APART,
             "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
             "HYSTGEN_APART_IN_FIXED ": APART,
             "HYSTGEN_APART_IN_FLOAT ": "static ",
@@ -598,7 +601,7 @@ def _piece(text: str) -> Piece:
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
     """The types of blocks, a user's own last, and then of instances of models with effects."""
-    return [*_pieces(family.chain_types, family.facts), *own, *split_pieces(glue)]
+    return [*_pieces(CHAIN_TYPES, family.facts), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:

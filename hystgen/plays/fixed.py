@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.plays.loop import PlayTables, State, loop_output
 from hystgen.plays.slots import OUTPUT_CLAMPED, Reals
 
@@ -51,11 +51,7 @@ def code(t: FixedPlayTables, total: int) -> tuple[int, int]:
     """Output code of a sum, limited to the type, and its status bits."""
     found = nearest(total, t.limits.fraction[0])
     bits = OUTPUT_CLAMPED if found > t.limits.saturated[0] or found < -t.limits.saturated[0] else 0
-    if found > t.limits.code_max[0]:
-        return t.limits.code_max[0], bits
-    if found < -t.limits.code_max[0]:
-        return -t.limits.code_max[0], bits
-    return found, bits
+    return inside(found, -t.limits.code_max[0], t.limits.code_max[0]), bits
 
 
 @jit

@@ -166,7 +166,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
         x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(-1.0, 9.0, length), x)
         odd = rng.random(length) < np.where(op == slots.OP_STEP, 0.01, 0.1)
-        strange = [0.0, 1e30, -1e30] if tables.fixed else [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30]
+        codes = tables.threshold.dtype.kind == "i"
+        strange = [0.0, 1e30, -1e30] if codes else [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30]
         x[odd] = rng.choice(strange, int(odd.sum()))
         yield name, op, x
     if inverse:

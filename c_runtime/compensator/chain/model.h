@@ -8,13 +8,8 @@
 #endif
 #include "compensator/model.h"
 #ifdef HYSTGEN_CHAIN
-#ifdef HYSTGEN_FIXED
-#include "compensator/chain/tables_fixed.h"
-#include "compensator/chain/state_fixed.h"
-#else
 #include "compensator/chain/tables.h"
 #include "compensator/chain/state.h"
-#endif
 #endif
 #ifndef HYSTGEN_CONFIGURED
 
@@ -51,7 +46,6 @@
 #define HYSTGEN_BUMP_END 2000000000
 #define HYSTGEN_YIELD_BITS 8u
 #define HYSTGEN_STRETCH 2147483648u
-extern const hystgen_factor_t hystgen_waited;
 extern const hystgen_factor_t hystgen_relaxing_late;
 extern const hystgen_factor_t hystgen_relaxing_kept;
 extern const hystgen_tables_t hystgen_relaxing_tables;
@@ -69,7 +63,6 @@ extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_SLEW_RISING_REST 0.0f
 #define HYSTGEN_SLEW_FALLING_REST 0.0f
 #define HYSTGEN_DITHER 0.0001f
-#define HYSTGEN_WAITED 0.5f
 #define HYSTGEN_LATE 0.1f
 #define HYSTGEN_KEPT 0.2f
 #define HYSTGEN_STANDING_SHARE 0.3f
@@ -102,6 +95,7 @@ extern const hystgen_real_t hystgen_yields[HYSTGEN_YIELDS][5];
 extern const hystgen_real_t hystgen_curve[HYSTGEN_N_PLAYS + 1][HYSTGEN_TERMS];
 #endif
 
+extern const hystgen_factor_t hystgen_waited[1];
 extern const hystgen_lag_table_t hystgen_braked_1;
 extern const hystgen_ageing_table_t hystgen_ageing_1;
 

@@ -1,4 +1,4 @@
-/* The memory of a model's effects in floating point. */
+/* The memory of a model's effects, in every arithmetic. */
 #ifndef HYSTGEN_CHAIN
 #define HYSTGEN_CHAIN
 #endif
@@ -12,6 +12,16 @@ typedef struct {
     hystgen_play_t rest;
 } hystgen_ramp_t;
 
+#ifdef HYSTGEN_FIXED
+typedef struct {
+    hystgen_signal_t next; /* at the next sample for an unchanged input */
+} hystgen_creep_state_t;
+
+typedef struct {
+    hystgen_signal_t before; /* input of the last sample */
+    hystgen_signal_t ahead;  /* output of the next one for the same input */
+} hystgen_creep_t;
+#else
 /* A number in two parts, since its steps may be far smaller than its last bit. */
 typedef struct {
     hystgen_real_t high;
@@ -21,73 +31,123 @@ typedef struct {
 typedef struct {
     hystgen_real_t ahead; /* output of the next sample for an input of 0 */
 } hystgen_creep_t;
+#endif
 
 typedef struct {
-    hystgen_real_t high; /* x, the response to a zero-order-hold drive, in two parts */
-    hystgen_real_t low;
-    hystgen_real_t wanted; /* output for the last input */
-    hystgen_real_t asked;  /* requested output, */
-    hystgen_real_t answer; /* and the input solved for it */
+    hystgen_signal_t high; /* x, the response to a zero-order-hold drive; */
+#ifndef HYSTGEN_FIXED
+    hystgen_signal_t low; /* its rounding remainder */
+#endif
+    hystgen_signal_t wanted; /* output for the last input */
+    hystgen_signal_t asked;  /* requested output, */
+#ifdef HYSTGEN_FIXED
+    hystgen_signal_t lead; /* and the move of x solved for it */
+#else
+    hystgen_signal_t answer; /* and the input solved for it */
+#endif
 } hystgen_lag_t;
 
 typedef struct {
     hystgen_lag_t lag;
-    hystgen_real_t earlier; /* output requested one sample before */
+    hystgen_signal_t earlier; /* output requested one sample before */
 } hystgen_braked_t;
 
+#ifdef HYSTGEN_FIXED
+/* Numbers of the search for a lead, with fewer bits than signals. */
 typedef struct {
-    hystgen_real_t way;   /* move of the lag's target in this sample, */
-    hystgen_real_t moved; /* and in the previous one */
-    bool rises;           /* the lag arrives from below */
+    int32_t left; /* distance that the lag is to gain beyond its target's move */
+    int32_t back; /* decrease of the lead in a step */
+    int32_t lead; /* lead before a cut */
+    int32_t room; /* largest cut of the lead */
+} hystgen_brake_t;
+#endif
+
+typedef struct {
+    hystgen_signal_t way;   /* move of the lag's target in this sample, */
+    hystgen_signal_t moved; /* and in the previous one */
+    bool rises;             /* the lag arrives from below */
 } hystgen_steady_t;
 
 typedef struct {
-    hystgen_real_t reached;
-    hystgen_real_t before; /* input of the last sample */
+#ifdef HYSTGEN_FIXED
+    hystgen_signal_t next; /* output at the next sample for an unchanged input */
+#else
+    hystgen_signal_t reached;
+#endif
+    hystgen_signal_t before; /* input of the last sample */
 } hystgen_lag_exact_t;
 
 typedef struct {
-    hystgen_real_t arrived; /* last output of the drive side */
-    hystgen_real_t reference;
+    hystgen_signal_t arrived; /* last output of the drive side */
+    hystgen_signal_t reference;
     uint32_t equal; /* equal references in a row, at most one more than needed to stand still */
 } hystgen_quiet_t;
 
 typedef struct {
-    hystgen_real_t before; /* input of the last sample */
-    hystgen_real_t off;    /* output minus input */
-    hystgen_real_t rate;   /* of `off`, per radian of the mode */
+    hystgen_signal_t before; /* input of the last sample */
+    hystgen_signal_t off;    /* output minus input */
+    hystgen_signal_t rate;   /* of `off`, per radian of the mode */
 } hystgen_mode_t;
 
 typedef struct {
-    hystgen_real_t gain;
-    hystgen_real_t inverse;
-    hystgen_real_t offset;
+    hystgen_narrow_t gain;
+    hystgen_narrow_t inverse;
+    hystgen_signal_t offset;
 } hystgen_gain_t;
 
 typedef struct {
-    hystgen_real_t high; /* travel, in two parts */
-    hystgen_real_t low;
-    hystgen_real_t gain;
-    hystgen_real_t inverse;
+    hystgen_signal_t high; /* travel, in fixed point in drive codes; */
+#ifndef HYSTGEN_FIXED
+    hystgen_signal_t low; /* its rounding remainder */
+#endif
+    hystgen_narrow_t gain;
+    hystgen_narrow_t inverse;
     bool own; /* the gain depends on the travel */
 } hystgen_ageing_t;
 
 typedef struct {
-    hystgen_real_t high; /* rise of the temperature, in two parts */
-    hystgen_real_t low;
-    hystgen_real_t gain;
-    hystgen_real_t inverse;
-    hystgen_real_t offset;
+    hystgen_signal_t high; /* rise of the temperature over the surroundings; */
+#ifndef HYSTGEN_FIXED
+    hystgen_signal_t low; /* its rounding remainder */
+#endif
+    hystgen_narrow_t gain;
+    hystgen_narrow_t inverse;
+    hystgen_signal_t offset;
 } hystgen_heat_t;
 
 typedef struct {
-    hystgen_real_t at; /* value of a friction play */
+    hystgen_narrow_t at; /* value of a friction play */
 } hystgen_friction_state_t;
 
 typedef struct {
     bool begun; /* the friction plays have values */
 } hystgen_friction_t;
 
+#ifdef HYSTGEN_FIXED
+typedef struct {
+    hystgen_signal_t whole;  /* drift, in units of signals, */
+    hystgen_signal_t part;   /* and the fraction below, in units of the table */
+    hystgen_signal_t lead;   /* samples by which the next reference is ahead */
+    hystgen_signal_t gained; /* growth of the change in a sample since the start */
+    hystgen_signal_t count;  /* samples since the start */
+} hystgen_clock_t;
+
+/* A search between two inputs of the plays, `low` and one above `top`, which are not tried again,
+   for the one at which their sum is `sum`. It lies in the memory of an operator, not on its stack.
+ */
+typedef struct {
+    int64_t sum;
+    int64_t short_of; /* what the sum lacks at `low`, or 0 if `low` is below all inputs, */
+    int64_t over;     /* and what it has too much above `top`, or -1 */
+    int64_t found;    /* sum at the input tried last, */
+    int64_t last;     /* and at the one before */
+    int64_t slope;    /* change of the sum per change of the input; kept from search to search */
+    int32_t input;    /* the one tried last, */
+    int32_t before;   /* and the one before */
+    int32_t low;
+    int32_t top;
+} hystgen_search_t;
+#else
 typedef struct {
     hystgen_real_t high; /* samples counted: multiples of the table's carry, and the rest */
     hystgen_real_t low;
@@ -105,5 +165,6 @@ typedef struct {
     hystgen_real_t slope; /* and its change per change of the input; */
     hystgen_real_t steep; /* that of one play */
 } hystgen_search_t;
+#endif
 
 #endif

@@ -261,7 +261,7 @@ class Bounds:
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0])
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0, 0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if self._ahead and self.static.branches_differ:  # the front can settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.basics.problems import FormatError
 from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
@@ -220,10 +220,15 @@ def preview_repeat(line: PreviewLine) -> None:
         preview_put(line, line.sample[len(line.sample) - 1])
 
 
-@jit
-def preview_target(tap: Reals, line: PreviewLine) -> Scalar:
-    """The output to reach at this sample: the weighted sum of the line."""
-    total = tap[0] * line.sample[0]
-    for i in range(1, len(tap)):
-        total = total + tap[i] * line.sample[i]
-    return total
+def targeting(product: Answer) -> Answer:
+    """A function for the output to reach at this sample, the weighted sum of the line, in an arithmetic with this
+    product of a number and a factor of an array."""
+
+    @jit
+    def preview_target(tap: Reals, line: PreviewLine) -> Scalar:
+        total: Scalar = product(line.sample[0], tap, 0)
+        for i in range(1, len(tap)):
+            total = total + product(line.sample[i], tap, i)
+        return total
+
+    return preview_target

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
+from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, inside, jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
@@ -480,14 +480,10 @@ def made_of(
         if not finite(t, d):
             s.plays.step.status[0] |= HELD
             return
-        inside = d
-        if inside > t.number.farthest_offset[0]:
-            inside = t.number.farthest_offset[0]
-        elif inside < -t.number.farthest_offset[0]:
-            inside = -t.number.farthest_offset[0]
-        if inside != d:
+        within = inside(d, -t.number.farthest_offset[0], t.number.farthest_offset[0])
+        if within != d:
             s.plays.step.status[0] |= LIMITED_SETTING
-        s.own.offset[0] = inside
+        s.own.offset[0] = within
 
     @jit
     def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hystgen.arithmetic.factors import times
-from hystgen.basics.jit import jit
+from hystgen.arithmetic.factors import paired, times
+from hystgen.basics.jit import inside, jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
 from hystgen.compensator.chain.layout import REST_BITS, TRAVEL_BITS, FixedChainTables
 from hystgen.compensator.chain.parts import LED, PARTS
-from hystgen.compensator.chain.preview import PreviewLine
+from hystgen.compensator.chain.preview import targeting
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Conversions
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
-from hystgen.plays.slots import OUTPUT_CLAMPED, Reals, zero
+from hystgen.plays.slots import OUTPUT_CLAMPED
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
 
@@ -58,11 +58,7 @@ def finer(t: FixedChainTables, s: ChainState, h: int, w: int, a: int) -> int:
         low = w - t.plays.threshold[i]
         high = w + t.plays.threshold[i]
         play = s.plays.play[i]
-        z = play
-        if z > high:
-            z = high
-        if z < low:
-            z = low
+        z = inside(play, low, high)
         if z != play:
             k = i + 1
         left = left - t.plays.weight[i] * z
@@ -71,18 +67,6 @@ def finer(t: FixedChainTables, s: ChainState, h: int, w: int, a: int) -> int:
         return whole
     more = divide_by_slope(t.plays, size << bits, k)
     return whole - more if left < 0 else whole + more
-
-
-# ---------------------------------------------------------------- preview_fixed.c
-
-
-@jit
-def preview_target(tap: Reals, line: PreviewLine) -> int:
-    """The output to reach at this sample: the weighted sum of the line."""
-    total = zero(line.sample[0])
-    for i in range(len(tap)):
-        total = total + times(line.sample[i], tap[i, 0], tap[i, 1])
-    return total
 
 
 # ---------------------------------------------------------------- chain_fixed.c
@@ -109,23 +93,15 @@ def level_signal(t: FixedChainTables, u: int) -> int:
 @jit
 def drive_code(t: FixedChainTables, x: int) -> int:
     """The drive code of a signal, limited to two spans beyond the range."""
-    code = nearest(x, t.number.drive_bits[0])
-    if code > t.number.most_code[0]:
-        return t.number.most_code[0]
-    if code < t.number.least_code[0]:
-        return t.number.least_code[0]
-    return code
+    return inside(nearest(x, t.number.drive_bits[0]), t.number.least_code[0], t.number.most_code[0])
 
 
 @jit
 def output_code(t: FixedChainTables, y: int) -> tuple[int, int]:
     """The output code of a signal, limited to the type, and its status."""
     code = nearest(y, t.number.level_bits[0])
-    if code > t.limits.code_max[0]:
-        return t.limits.code_max[0], OUTPUT_CLAMPED
-    if code < -t.limits.code_max[0]:
-        return -t.limits.code_max[0], OUTPUT_CLAMPED
-    return code, 0
+    within = inside(code, -t.limits.code_max[0], t.limits.code_max[0])
+    return within, OUTPUT_CLAMPED if within != code else 0
 
 
 @jit
@@ -171,7 +147,7 @@ def ramp(before: int, rest: int, move: int, more: int) -> tuple[int, int]:
 
 
 BLOCKS = Blocks(
-    lambda part: part.fixed.verbs, (maps_forward, maps_inverse), preview_target, (front_forward, front_inverse),
+    lambda part: part.fixed.verbs, (maps_forward, maps_inverse), targeting(paired), (front_forward, front_inverse),
     moving_fixed.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from hystgen.arithmetic.factors import multiplied
 from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import corners_float, moving_float
 from hystgen.compensator.chain.layout import FloatChainTables, Stages
 from hystgen.compensator.chain.parts import LED, PARTS
-from hystgen.compensator.chain.preview import preview_target
+from hystgen.compensator.chain.preview import targeting
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Conversions
 from hystgen.front.compensator import front_forward, front_inverse
@@ -81,7 +82,7 @@ def ramp(before: Scalar, rest: Scalar, move: Scalar, more: Scalar) -> tuple[Scal
 
 
 BLOCKS = Blocks(
-    lambda part: part.floating.verbs, (bent, unbent), preview_target, (front_forward, front_inverse),
+    lambda part: part.floating.verbs, (bent, unbent), targeting(multiplied), (front_forward, front_inverse),
     moving_float.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)

@@ -1,3 +1,3 @@
 """Gain that falls with the distance travelled."""
 
-SOURCES = {"blocks": ("ageing{}.c",), "calls": ("calls.c",)}
+SOURCES = {"blocks": ("ageing.c",), "calls": ("calls.c",)}

@@ -1,11 +1,7 @@
 /* Ageing: the travel, and the gain that follows it. Called by users. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
-#ifdef HYSTGEN_FIXED
-#include "effects/ageing/ageing_fixed.c"
-#else
 #include "effects/ageing/ageing.c"
-#endif
 
 hystgen_travel_t hystgen_operator_travel(const hystgen_operator_t *self) {
     return self->ageing_1.high;

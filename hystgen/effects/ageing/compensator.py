@@ -6,16 +6,36 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Action, Answer, Check, Scalar, jit
-from hystgen.basics.structures import Count, Flag, NumberArray, Real, SmallCount, Struct, firsts, memory_of
+from hystgen.basics.jit import Action, Answer, Scalar, inside, jit
+from hystgen.basics.structures import (
+    Count,
+    Flag,
+    FourNarrow,
+    Narrow,
+    Real,
+    Signal,
+    SmallCount,
+    Struct,
+    firsts,
+    memory_of,
+)
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
-from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.gains import (
+    FLOATING,
+    LARGEST_GAIN,
+    LEAST_GAIN,
+    MOST_CHANGE,
+    GainLimits,
+    Gains,
+    following,
+    newton_steps,
+    too_fast,
+)
+from hystgen.effects.kinds import BlockKind, RowedTables, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -29,7 +49,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
@@ -44,35 +64,33 @@ float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times 
 `0.05/2.3 * 6/384 * 0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
 
 
+def losses(effect: ExponentialAgeing | SeveralAgeing) -> list[tuple[float, float]]:
+    """The losses that come to an end, each with its travel."""
+    if isinstance(effect, ExponentialAgeing):
+        return [(effect.loss, effect.travel)]
+    return list(zip(effect.losses, effect.travels, strict=True))
+
+
 def gain(effect: Ageing, travelled: float) -> float:
     """The gain after a travel in input units."""
     if isinstance(effect, LogarithmicAgeing):
         return 1.0 - effect.loss * math.log10(1.0 + min(travelled / effect.travel, 1e300))
-    if isinstance(effect, ExponentialAgeing):
-        return 1.0 + effect.loss * math.expm1(-travelled / effect.travel)
-    pairs = zip(effect.losses, effect.travels, strict=True)
-    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
+    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in losses(effect))
 
 
 def steepness(effect: Ageing, travelled: float) -> float:
     """Change of the gain per input unit of travel."""
     if isinstance(effect, LogarithmicAgeing):
         return -effect.loss / (math.log(10.0) * (effect.travel + travelled))
-    if isinstance(effect, ExponentialAgeing):
-        return -effect.loss / effect.travel * math.exp(-travelled / effect.travel)
-    pairs = zip(effect.losses, effect.travels, strict=True)
-    return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
+    return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in losses(effect))
 
 
 class AgeingPiece(Struct):
     """A piece of the gain over travel: a cubic in the fraction of its length."""
 
-    begin: Real
-    inverse_length: Real
-    c0: Real
-    c1: Real
-    c2: Real
-    c3: Real
+    begin: Signal
+    share: Real  # of a unit of travel in the length
+    c: FourNarrow
 
 
 @functools.lru_cache(maxsize=16)
@@ -81,8 +99,7 @@ def pieces(effect: Ageing) -> AgeingPiece:
 
     Each piece matches the gain's values and slopes at its ends and is as long as TABLE_ERROR allows.
     """
-    several = isinstance(effect, SeveralAgeing)
-    travels = effect.travels if several else (effect.travel,)  # type: ignore[union-attr]
+    travels = [effect.travel] if isinstance(effect, LogarithmicAgeing) else [travel for _, travel in losses(effect)]
     last = max(travels) * 10.0**DECADES if isinstance(effect, LogarithmicAgeing) else 20.0 * max(travels)
     rows = []
     at, length = 0.0, 0.25 * min(travels)
@@ -99,15 +116,15 @@ def pieces(effect: Ageing) -> AgeingPiece:
     return AgeingPiece.of(rows, np.float64)
 
 
-def _piece(effect: Ageing, at: float, length: float) -> tuple[float, ...]:
+def _piece(effect: Ageing, at: float, length: float) -> tuple[float, float, tuple[float, ...]]:
     a, b = gain(effect, at), gain(effect, at + length)
     da, db = (length * steepness(effect, x) for x in (at, at + length))
-    return at, 1.0 / length, a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+    return at, 1.0 / length, (a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db)
 
 
-def _error(effect: Ageing, row: tuple[float, ...]) -> float:
+def _error(effect: Ageing, row: tuple[float, float, tuple[float, ...]]) -> float:
     """Largest difference from the gain at points inside a piece."""
-    at, inverse, *c = row
+    at, inverse, c = row
     shares = np.linspace(0.0, 1.0, 17)[1:-1]
     curve = ((c[3] * shares + c[2]) * shares + c[1]) * shares + c[0]
     pairs = zip(shares.tolist(), curve.tolist(), strict=True)
@@ -154,56 +171,47 @@ class Aged(One):
 
 
 class AgeingTable(Struct):
-    """Gain over travel up to `last`; a gain that the caller sets lies between `least` and `largest`."""
+    """Gain over travel up to `last`."""
 
-    least: Real
-    largest: Real
-    last: Real
+    last: Signal
     n: Count
     turns: SmallCount  # Newton steps for the reciprocal of a gain that has changed
 
 
-class AgeingNumbers(AgeingTable):
+class AgeingNumbers(AgeingTable, GainLimits):
     """The same with constants that are not in the table in C."""
-
-    one: Real
-    two: Real
 
 
 class AgeingState(Struct):
     """A gain."""
 
-    high: Real  # travel, in two parts
-    low: Real
-    gain: Real
-    inverse: Real
+    high: Signal  # travel, in two parts
+    low: Signal
+    gain: Narrow
+    inverse: Narrow
     own: Flag  # the gain follows the travel
 
 
-KIND = Kind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
+KIND = BlockKind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
 
 
-class AgeingTables(NamedTuple):
-    """All ageing of a model: `block` (k,), the pieces of each from `first` (k + 1) on in `piece` (m,)."""
-
-    block: AgeingNumbers
-    first: Counts
-    piece: AgeingPiece
+AgeingTables = RowedTables[AgeingNumbers, AgeingPiece]
 
 
 def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     """The tables of several blocks in floating point."""
     curves = [pieces(one.effect) for one in blocks]
     span = about.ends[1] - about.ends[0]
-    given = [(LEAST_GAIN, LARGEST_GAIN, each.begin[-1] + 1.0 / each.inverse_length[-1], 1.0, 2.0) for each in curves]
-    rows = about.reals(given, "travels of the ageing")
+    ends = [(*FLOATING.limits, each.begin[-1] + 1.0 / each.share[-1]) for each in curves]
+    rows = about.reals(ends, "travels of the ageing")
     counts = [*map(len, curves)]
     turns = [newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks]
-    piece = about.reals([each.tolist() for curve in curves for each in curve], "travels of the ageing")
+    given = [(at, share, *c) for curve in curves for at, share, c in curve.tolist()]
+    piece = about.reals(given, "travels of the ageing")
     return AgeingTables(
-        AgeingNumbers.of([(*row[:3], *n, *row[3:]) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
+        AgeingNumbers.of([(*row, *n) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
         firsts(counts),
-        AgeingPiece.of(piece, piece.dtype),
+        AgeingPiece.of([(at, share, c) for at, share, *c in piece], piece.dtype),
     )
 
 
@@ -226,64 +234,16 @@ class UnevenAgeing:
 
 
 @jit
-def piece_at(first: Counts, begin: NumberArray, j: int, travel: Scalar) -> int:
-    """The piece of the gain of block j at a travel."""
-    low = first[j]
-    high = first[j + 1]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if travel >= begin[middle]:
-            low = middle
-        else:
-            high = middle
-    return low
+def along(t: AgeingTables, k: int, travel: Scalar) -> Scalar:
+    """The place of a travel in piece k, from 0 on; past the last piece it stays at the end."""
+    share = (travel - t.row.begin[k]) * t.row.share[k]
+    return t.block.one[0] if share > t.block.one[0] else share
 
 
 @jit
-def ageing_gain(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
-    """The gain at a travel; past the last piece it stays constant."""
-    low = piece_at(t.first, t.piece.begin, j, travel)
-    share = (travel - t.piece.begin[low]) * t.piece.inverse_length[low]
-    if share > t.block.one[j]:
-        share = t.block.one[j]
-    return ((t.piece.c3[low] * share + t.piece.c2[low]) * share + t.piece.c1[low]) * share + t.piece.c0[low]
-
-
-@jit
-def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -> bool:
-    """Set the travel. Returns whether it had to be limited."""
-    inside = travel
-    if inside < zero(t.block.one[j]):
-        inside = zero(t.block.one[j])
-    elif inside > t.block.last[j]:
-        inside = t.block.last[j]
-    s.high[j] = inside
-    s.low[j] = zero(inside)
-    s.own[j] = 1
-    s.gain[j] = ageing_gain(t, j, inside)
-    s.inverse[j] = t.block.one[j] / s.gain[j]
-    return bool(inside != travel)
-
-
-@jit
-def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
-    """Set a gain that replaces the one from the travel. Returns whether it had to be limited."""
-    inside = gain
-    if inside < t.block.least[j]:
-        inside = t.block.least[j]
-    elif inside > t.block.largest[j]:
-        inside = t.block.largest[j]
-    s.own[j] = 0
-    s.gain[j] = inside
-    s.inverse[j] = t.block.one[j] / inside
-    return bool(inside != gain)
-
-
-@jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scalar) -> None:
-    """Note that the drive has moved from `before` to v."""
-    way = v - before
-    change = (way if way >= zero(way) else -way) + s.low[j]
+def travel_on(t: AgeingTables, s: AgeingState, j: int, way: Scalar) -> None:
+    """The drive has travelled on."""
+    change = way + s.low[j]
     high = s.high[j]
     following: Scalar = high + change
     if following > t.block.last[j]:
@@ -291,31 +251,67 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scal
         change = following - high
     s.high[j] = following
     s.low[j] = change - (following - high)
-    if s.own[j]:
-        gain = ageing_gain(t, j, following)
-        inverse: Scalar = s.inverse[j]
-        for _ in range(t.block.turns[j]):
-            inverse = inverse * (t.block.two[j] - gain * inverse)
-        s.gain[j] = gain
-        s.inverse[j] = inverse
 
 
-@jit(inline=True)
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return y * s.inverse[j]
+def verbs(by: Gains, state: type[Struct], along: Answer, part_of: Answer, travel_on: Action) -> Verbs:
+    """The verbs of ageing in an arithmetic: from the functions of that name above; `part_of`: a gain times a place in a
+    piece."""
+    followed, times, reciprocal, given, put = following(by), by.times, by.reciprocal, by.given, by.put
 
+    @jit
+    def gain_at(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
+        """The gain at a travel."""
+        low = t.first[j]
+        high = t.first[j + 1]
+        while high - low > 1:
+            middle = (low + high) // 2
+            if travel >= t.row.begin[middle]:
+                low = middle
+            else:
+                high = middle
+        share = along(t, low, travel)
+        gain: Scalar = t.row.c[low, 3]
+        for k in range(2, -1, -1):
+            gain = part_of(gain, share) + t.row.c[low, k]
+        return gain
 
-@jit(inline=True)
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return s.gain[j] * x
+    @jit
+    def set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -> bool:
+        """Set the travel. Returns whether it had to be limited."""
+        taken = inside(travel, zero(t.block.last[j]), t.block.last[j])
+        put(s, j, taken)
+        s.own[j] = 1
+        s.gain[j] = gain_at(t, j, taken)
+        s.inverse[j] = reciprocal(t.block.one[j], s.gain[j])
+        return bool(taken != travel)
 
+    @jit
+    def set_gain(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
+        """Set a gain that replaces the one from the travel. Returns whether it had to be limited."""
+        asked = given(t.block, j, gain)
+        s.own[j] = 0
+        s.gain[j] = inside(asked, t.block.least[j], t.block.largest[j])
+        s.inverse[j] = reciprocal(t.block.one[j], s.gain[j])
+        return bool(s.gain[j] != asked)
 
-def verbs(
-    state: type[Struct], absorb: Answer, solve: Answer, move: Action, set_gain: Check, set_travel: Check
-) -> Verbs:
-    """The verbs of ageing from its functions in an arithmetic."""
+    @jit
+    def move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scalar) -> None:
+        """Note that the drive has moved from `before` to v."""
+        way = v - before
+        travel_on(t, s, j, way if way >= zero(way) else -way)
+        if s.own[j]:
+            s.gain[j] = gain_at(t, j, s.high[j])
+            s.inverse[j] = followed(s.gain[j], s.inverse[j], t.block.two[j], t.block.turns[j])
+
+    @jit(inline=True)
+    def solve(t: AgeingTables, s: AgeingState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The input that gives the output y."""
+        return times(y, s.inverse[j])
+
+    @jit(inline=True)
+    def absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The output for the input x."""
+        return times(x, s.gain[j])
 
     @jit
     def reset(t: AgeingTables, s: AgeingState, j: int) -> None:
@@ -334,8 +330,7 @@ def verbs(
 
 
 ARITHMETIC = Realized(
-    verbs(AgeingState, ageing_absorb, ageing_solve, ageing_move, ageing_set, ageing_set_travel),
-    numbered(KIND, 5, 1), tables, kinds=(KIND,),
+    verbs(FLOATING, AgeingState, along, FLOATING.product, travel_on), numbered(KIND, 5, 1), tables, kinds=(KIND,)
 )
 
 PART = ChainPart(

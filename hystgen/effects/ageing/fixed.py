@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8, firsts
+from hystgen.basics.structures import Factor, Flag, FourNarrow, Narrow, Signal, Struct, UInt8, firsts
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import Aged, AgeingPiece, piece_at
+from hystgen.effects.ageing.compensator import Aged, AgeingPiece, AgeingTable
 from hystgen.effects.gains import (
+    FIXED,
     GAIN_BITS,
-    LARGEST,
     LARGEST_GAIN,
-    LEAST,
     LEAST_GAIN,
     ONE,
     RECIPROCAL_ERROR,
-    followed,
+    GainLimits,
     newton_steps,
-    reciprocal,
 )
-from hystgen.effects.kinds import Rows, numbered
+from hystgen.effects.kinds import RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
 """Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""
@@ -42,27 +39,28 @@ LONGEST = 2**61
 class FixedAgeingPiece(Struct):
     """A piece of the gain over travel: a cubic in the fraction of its length."""
 
-    begin: Int64
+    begin: Signal
     share: Factor  # of the travel since `begin`, without the bits that the product drops
     drop: UInt8
-    c: FourInt32
+    c: FourNarrow
 
 
-class FixedAgeingTable(Struct):
+class FixedAgeingTable(AgeingTable):
     """Gain over travel up to `last`."""
 
-    last: Int64
-    n: Count
-    turns: UInt8  # Newton steps for the reciprocal of a gain that has changed
     bits: UInt8  # of a gain below the code that sets it
+
+
+class FixedAgeingNumbers(FixedAgeingTable, GainLimits):
+    """The same with constants that are not in the table in C."""
 
 
 class FixedAgeingState(Struct):
     """A gain."""
 
-    high: Int64  # travel, drive codes
-    gain: Int32
-    inverse: Int32
+    high: Signal  # travel, drive codes
+    gain: Narrow
+    inverse: Narrow
     own: Flag  # the gain follows the travel
 
 
@@ -71,12 +69,7 @@ KIND = replace(
 )
 
 
-class FixedAgeingTables(NamedTuple):
-    """All ageing of a model, as in floating point."""
-
-    block: FixedAgeingTable
-    first: Counts
-    piece: FixedAgeingPiece
+FixedAgeingTables = RowedTables[FixedAgeingNumbers, FixedAgeingPiece]
 
 
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
@@ -88,7 +81,7 @@ def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> Fi
     block = []
     for pieces, turns in rows:
         last, before = 0, len(piece)
-        for begin, inverse_length, *curve in pieces.tolist():
+        for begin, inverse_length, curve in pieces.tolist():
             length = 1.0 / inverse_length / lsb
             drop = max(0, round(length).bit_length() + 1 - (MOST.bit_length() - 1))
             at = round(begin / lsb)
@@ -97,9 +90,9 @@ def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> Fi
             share = factor(2.0**SHARE_BITS / length * 2.0**drop)
             piece.append((at, share, drop, [round(c * ONE) for c in curve]))
             last = at + round(length)
-        block.append((last, len(piece) - before, turns, bits))
-    first = firsts(n for _, n, *_ in block)
-    return FixedAgeingTables(FixedAgeingTable.of(block), first, FixedAgeingPiece.of(piece))
+        block.append((*FIXED.limits, last, len(piece) - before, turns, bits))
+    numbers = FixedAgeingNumbers.of(block)
+    return FixedAgeingTables(numbers, firsts(numbers.n.tolist()), FixedAgeingPiece.of(piece))
 
 
 @dataclass(frozen=True)
@@ -130,80 +123,31 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgei
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
 
 
-# ---------------------------------------------------------------- ageing_fixed.c
+# ---------------------------------------------------------------- ageing.c
 
 
 @jit
-def ageing_gain(t: FixedAgeingTables, j: int, travel: int) -> int:
-    """The gain at a travel; past the last piece it stays constant."""
-    low = piece_at(t.first, t.piece.begin, j, travel)
-    on = (travel - t.piece.begin[low]) >> t.piece.drop[low]
-    share = times(on, t.piece.share.mantissa[low], t.piece.share.shift[low])
-    if share > 1 << SHARE_BITS:
-        share = zero(share) + (1 << SHARE_BITS)
-    gain = zero(share)
-    for k in range(3, -1, -1):
-        gain = t.piece.c[low, k] + ((gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS)
-    return gain
+def along(t: FixedAgeingTables, k: int, travel: int) -> int:
+    """As in floating point."""
+    on = (travel - t.row.begin[k]) >> t.row.drop[k]
+    share = times(on, t.row.share.mantissa[k], t.row.share.shift[k])
+    return zero(share) + (1 << SHARE_BITS) if share > 1 << SHARE_BITS else share
 
 
 @jit
-def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: int) -> bool:
-    """Set the travel. Returns whether it had to be limited."""
-    inside = travel
-    if inside < 0:
-        inside = zero(travel)
-    elif inside > t.block.last[j]:
-        inside = t.block.last[j]
-    s.high[j] = inside
-    s.own[j] = 1
-    s.gain[j] = ageing_gain(t, j, inside)
-    s.inverse[j] = reciprocal(s.gain[j])
-    return bool(inside != travel)
+def part_of(gain: int, share: int) -> int:
+    """A gain times a place in a piece."""
+    return (gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS
 
 
 @jit
-def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: int) -> bool:
-    """Set a gain that replaces the one from the travel. Returns whether it had to be limited."""
-    given = gain << t.block.bits[j]
-    inside = given
-    if inside < LEAST:
-        inside = zero(given) + LEAST
-    elif inside > LARGEST:
-        inside = zero(given) + LARGEST
-    s.own[j] = 0
-    s.gain[j] = inside
-    s.inverse[j] = reciprocal(inside)
-    return bool(inside != given)
-
-
-@jit
-def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: int, v: int) -> None:
-    """Note that the drive has moved from `before` to v."""
-    way = v - before
-    following = s.high[j] + (way if way >= 0 else -way)
-    if following > t.block.last[j]:
-        following = t.block.last[j]
-    s.high[j] = following
-    if s.own[j]:
-        gain = ageing_gain(t, j, following)
-        s.inverse[j] = followed(gain, s.inverse[j], t.block.turns[j])
-        s.gain[j] = gain
-
-
-@jit
-def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: int) -> int:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return times(y, s.inverse[j], GAIN_BITS)
-
-
-@jit
-def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: int) -> int:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return times(x, s.gain[j], GAIN_BITS)
+def travel_on(t: FixedAgeingTables, s: FixedAgeingState, j: int, way: int) -> None:
+    """The drive has travelled on."""
+    following = s.high[j] + way
+    s.high[j] = t.block.last[j] if following > t.block.last[j] else following
 
 
 ARITHMETIC = Realized(
-    floating.verbs(FixedAgeingState, ageing_absorb, ageing_solve, ageing_move, ageing_set, ageing_set_travel),
+    floating.verbs(FIXED, FixedAgeingState, along, part_of, travel_on),
     numbered(KIND, 8, 2), made, formats, kinds=(KIND,),
 )

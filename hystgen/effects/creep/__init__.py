@@ -1,3 +1,3 @@
 """Creep."""
 
-SOURCES = {"blocks": ("creep{}.c",)}
+SOURCES = {"blocks": ("creep.c",)}

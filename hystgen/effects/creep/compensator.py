@@ -5,18 +5,18 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import Answer, Scalar, jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, firsts, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, added, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -154,22 +154,11 @@ class CreepState(Struct):
     ahead: Real  # output of the next sample for an input of 0
 
 
-KIND = Kind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))
+KIND = BlockKind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))
 
 
-class CreepTables(NamedTuple):
-    """All creep blocks of a model: `block` (k,), the states of each from `first` (k + 1) on in `term` (m,)."""
-
-    block: CreepTable
-    first: Counts
-    term: CreepTerm
-
-
-class CreepMemory(NamedTuple):
-    """Memory of all creep blocks: `block` (k,), `term` (m,)."""
-
-    block: CreepState
-    term: CreepTermState
+CreepTables = RowedTables[CreepTable, CreepTerm]
+CreepMemory = RowedMemory[CreepState, CreepTermState]
 
 
 def tables(blocks: Sequence[CreepNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]]) -> CreepTables:
@@ -189,9 +178,9 @@ def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     """Settle everything at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        settled = t.term.share[i] * x
-        s.term.high[i] = settled
-        s.term.low[i] = zero(x)
+        settled = t.row.share[i] * x
+        s.row.high[i] = settled
+        s.row.low[i] = zero(x)
         ahead = ahead + settled
     s.block.ahead[j] = ahead
     return t.block.rest[j] * x
@@ -215,12 +204,7 @@ def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        high = s.term.high[i]
-        change = t.term.rate[i] * (t.term.share[i] * x - high) + s.term.low[i]
-        following = high + change
-        s.term.high[i] = following
-        s.term.low[i] = change - (following - high)
-        ahead = ahead + following
+        ahead = ahead + added(s.row, i, t.row.rate[i] * (t.row.share[i] * x - s.row.high[i]))
     s.block.ahead[j] = ahead
     return y
 
@@ -248,8 +232,8 @@ class UnevenCreep(Block):
         now, following = self._numbers(seconds), self._numbers(later)
         rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
         found = tables([now], lambda values, _: np.array(values))
-        found.term.rate[:], found.term.share[:] = shares(following.terms).T
-        found.term.share[:] += late * (1.0 - rate) / rate
+        found.row.rate[:], found.row.share[:] = shares(following.terms).T
+        found.row.share[:] += late * (1.0 - rate) / rate
         return found
 
     def advance(self, seconds: float, later: float | None = None) -> None:
@@ -258,12 +242,10 @@ class UnevenCreep(Block):
 
     def call(self, verb: str, x: float) -> float:
         """The result of a verb for x."""
-        return float(FUNCTIONS[verb](self.table, self.state, 0, x))
+        function = ARITHMETIC.verbs.verb(verb)
+        assert function
+        return float(function(self.table, self.state, 0, x))
 
-
-FUNCTIONS: dict[str, Answer] = {
-    "rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb,
-}
 
 PART = ChainPart(
     "creep", "creep", Place.LINEAR, called("creep"),

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +18,10 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.creep.compensator import CreepNumbers
-from hystgen.effects.kinds import Kind, Rows, numbered
+from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 
 class FixedCreepTerm(Struct):
@@ -59,22 +58,11 @@ class FixedCreepState(Struct):
     ahead: Int64  # output of the next sample for the same input
 
 
-KIND = Kind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
+KIND = BlockKind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
 
 
-class FixedCreepTables(NamedTuple):
-    """All creep blocks of a model, as in floating point."""
-
-    block: FixedCreepTable
-    first: Counts
-    term: FixedCreepTerm
-
-
-class FixedCreepMemory(NamedTuple):
-    """Memory of all creep blocks, as in floating point."""
-
-    block: FixedCreepState
-    term: FixedCreepTermState
+FixedCreepTables = RowedTables[FixedCreepTable, FixedCreepTerm]
+FixedCreepMemory = RowedMemory[FixedCreepState, FixedCreepTermState]
 
 
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
@@ -148,7 +136,7 @@ def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTa
     return FixedCreepTables(FixedCreepTable.of(block), first, FixedCreepTerm.of(term))
 
 
-# ---------------------------------------------------------------- creep_fixed.c
+# ---------------------------------------------------------------- creep.c
 
 
 @jit
@@ -156,8 +144,8 @@ def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
     """Settle everything at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        state = times(x, t.term.weight.mantissa[i], t.term.weight.shift[i]) << t.block.bits[j]
-        s.term.next[i] = state
+        state = times(x, t.row.weight.mantissa[i], t.row.weight.shift[i]) << t.block.bits[j]
+        s.row.next[i] = state
         total = total + state
     y = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j]) + nearest(total, t.block.bits[j])
     s.block.before[j] = x
@@ -186,12 +174,12 @@ def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> in
     total = zero(x)
     following = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        late = times(change, t.term.late.mantissa[i], t.term.late.shift[i]) << t.term.lift[i]
-        state = s.term.next[i] + late
+        late = times(change, t.row.late.mantissa[i], t.row.late.shift[i]) << t.row.lift[i]
+        state = s.row.next[i] + late
         total = total + state
-        settled = times(x, t.term.weight.mantissa[i], t.term.weight.shift[i]) << t.block.bits[j]
-        state = state + times((settled - state) >> t.block.drop[j], t.term.rate.mantissa[i], t.term.rate.shift[i])
-        s.term.next[i] = state
+        settled = times(x, t.row.weight.mantissa[i], t.row.weight.shift[i]) << t.block.bits[j]
+        state = state + times((settled - state) >> t.block.drop[j], t.row.rate.mantissa[i], t.row.rate.shift[i])
+        s.row.next[i] = state
         following = following + state
     s.block.before[j] = x
     s.block.ahead[j] = direct + nearest(following, t.block.bits[j])

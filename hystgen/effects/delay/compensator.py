@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from hystgen.arithmetic.factors import factor, times
+from hystgen.arithmetic.factors import factor, multiplied, paired
 from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.effects.base import Place
 from hystgen.effects.part import ChainPart, One, Realized, Setting, Surroundings, Verbs, called
@@ -24,7 +24,7 @@ MOST_SAMPLES = 2**15
 
 
 class DelayTables(NamedTuple):
-    """`share` (1,): elapsed share of the step after the oldest sample, in fixed point a factor (2,); `samples`: the
+    """`share` (1,): elapsed share of the step after the oldest sample, in fixed point (1, 2); `samples`: the
     number that wait, 0 without a delay."""
 
     share: Reals
@@ -56,7 +56,7 @@ def numbers(seconds: float, step: float) -> tuple[float, int]:
     return whole - late, whole + 1 if late > 0.0 else 0
 
 
-# ---------------------------------------------------------------- delay.c, delay_float.c or delay_fixed.c
+# ---------------------------------------------------------------- delay.c
 
 
 @jit
@@ -81,27 +81,19 @@ def delay_put(line: Waiting, v: Scalar) -> None:
     line.oldest[0] = delay_next(line)
 
 
-@jit
-def delayed(t: DelayTables, line: Waiting) -> Scalar:
-    """The drive that leaves the delay now."""
-    oldest = line.sample[line.oldest[0]]
-    return oldest + t.share[0] * (line.sample[delay_next(line)] - oldest)
-
-
-@jit
-def fixed_delayed(t: DelayTables, line: Waiting) -> Scalar:
-    """The same in fixed point, to the nearest code."""
-    oldest = line.sample[line.oldest[0]]
-    return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])
-
-
 def memory(t: DelayTables, dtype: DTypeLike) -> Waiting:
     """Memory of the delay of a model."""
     return Waiting(np.zeros(t.samples, dtype), np.zeros(1, np.int64))
 
 
-def verbs(delayed: Answer) -> Verbs:
-    """The verbs of a delay in one arithmetic, from its function `delayed`."""
+def verbs(product: Answer) -> Verbs:
+    """The verbs of a delay in an arithmetic, from its product of a number and a factor of an array."""
+
+    @jit
+    def delayed(t: DelayTables, line: Waiting) -> Scalar:
+        """The drive that leaves the delay now, in fixed point to the nearest code."""
+        oldest = line.sample[line.oldest[0]]
+        return oldest + product(line.sample[delay_next(line)] - oldest, t.share, 0)
 
     @jit
     def rest(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
@@ -125,12 +117,12 @@ def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], 
 
 
 ARITHMETIC = Realized(
-    verbs(delayed), lambda _: (),
+    verbs(multiplied), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
 )
 FIXED_ARITHMETIC = Realized(
-    verbs(fixed_delayed), lambda _: (),
-    lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
+    verbs(paired), lambda _: (),
+    lambda blocks, about: tables(blocks, about, lambda share: np.array([factor(share)], dtype=np.int64)),
 )
 
 

@@ -2,9 +2,7 @@
 #ifndef HYSTGEN_DELAY_DELAY_C
 #define HYSTGEN_DELAY_DELAY_C
 #include "compensator/chain/model.h"
-#ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
-#endif
 
 /* Sets the whole past of the drive to v. */
 static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
@@ -27,19 +25,12 @@ static void hystgen_delay_put(hystgen_real_t *sample, unsigned int *oldest, hyst
     *oldest = hystgen_delay_next(*oldest);
 }
 
-#ifdef HYSTGEN_FIXED
-/* The delayed drive, to the nearest code. */
+/* The delayed drive: the oldest sample plus a share of the step to the next one, in fixed point to
+   the nearest code. */
 static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned int oldest) {
     const hystgen_reach_t v = sample[oldest];
-    const int64_t change = (int64_t)sample[hystgen_delay_next(oldest)] - v;
-    return v + (hystgen_reach_t)hystgen_times(change, &hystgen_waited);
+    const hystgen_signal_t change = (hystgen_signal_t)sample[hystgen_delay_next(oldest)] - v;
+    return v + (hystgen_reach_t)hystgen_times(change, hystgen_waited);
 }
-#else
-/* The delayed drive: the oldest sample plus HYSTGEN_WAITED of the step to the next one. */
-static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned int oldest) {
-    const hystgen_real_t v = sample[oldest];
-    return v + HYSTGEN_WAITED * (sample[hystgen_delay_next(oldest)] - v);
-}
-#endif
 
 #endif

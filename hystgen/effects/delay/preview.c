@@ -1,9 +1,7 @@
 /* A line of references. The newest one is the argument of step and lies ahead of the motion. Called
    by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
-#ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
-#endif
 
 /* Appends a sample; the first one fills the line. Stores go through volatile where a compiler would
    otherwise call memmove, which a freestanding target may lack. */
@@ -24,25 +22,13 @@ static void hystgen_preview_repeat(hystgen_signal_t *line, bool *filled) {
     }
 }
 
-#ifdef HYSTGEN_FIXED
 /* The output to reach at this sample: the weighted sum of the line. */
-static int64_t hystgen_preview_target(const hystgen_factor_t *tap, const int64_t *line) {
-    int64_t sum = 0;
+static hystgen_signal_t hystgen_preview_target(const hystgen_factor_t *tap,
+                                               const hystgen_signal_t *line) {
+    hystgen_signal_t sum = hystgen_times(line[0], &tap[0]);
     unsigned int i;
-    for (i = 0; i < HYSTGEN_TAPS; ++i) {
+    for (i = 1; i < HYSTGEN_TAPS; ++i) {
         sum += hystgen_times(line[i], &tap[i]);
     }
     return sum;
 }
-#else
-/* The output to reach at this sample: the weighted sum of the line. */
-static hystgen_real_t hystgen_preview_target(const hystgen_real_t *tap,
-                                             const hystgen_real_t *line) {
-    hystgen_real_t sum = tap[0] * line[0];
-    unsigned int i;
-    for (i = 1; i < HYSTGEN_TAPS; ++i) {
-        sum = sum + tap[i] * line[i];
-    }
-    return sum;
-}
-#endif

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hystgen.basics.jit import Action, Answer, Scalar, jit
+from hystgen.basics.jit import Action, Answer, Scalar, inside, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import zero
 
@@ -44,7 +44,7 @@ class ClockState(Struct):
     lead: Real  # samples by which the next reference is ahead
 
 
-KIND = Kind("clock", ClockTable, ClockState, own=())
+KIND = BlockKind("clock", ClockTable, ClockState, own=())
 
 
 def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, ahead: int) -> tuple[float, ...]:
@@ -77,11 +77,7 @@ def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Scalar) -> Scalar
     """The drift `ahead` samples after the present one."""
     time = s.high[j] * t.block[j] + (s.low[j] + ahead) * t.sample[j]
     drift = (t.rate[j] + t.half_change[j] * time) * time
-    if drift > t.farthest[j]:
-        return t.farthest[j]
-    if drift < -t.farthest[j]:
-        return -t.farthest[j]
-    return drift
+    return inside(drift, -t.farthest[j], t.farthest[j])
 
 
 def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Answer) -> Verbs:

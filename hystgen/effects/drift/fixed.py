@@ -10,11 +10,11 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
-from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import zero
 
@@ -52,7 +52,7 @@ class FixedClockState(Struct):
     count: Int64  # samples since the start
 
 
-KIND = Kind("clock", FixedClockTable, FixedClockState, own=())
+KIND = BlockKind("clock", FixedClockTable, FixedClockState, own=())
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     return high
 
 
-# ---------------------------------------------------------------- clock_fixed.c
+# ---------------------------------------------------------------- clock.c
 
 
 @jit
@@ -134,11 +134,7 @@ def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) ->
     """The drift `ahead` samples after the present one."""
     more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
     drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])
-    if drift > t.farthest[j]:
-        return t.farthest[j]
-    if drift < -t.farthest[j]:
-        return -t.farthest[j]
-    return drift
+    return inside(drift, -t.farthest[j], t.farthest[j])
 
 
 def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockFormats:

@@ -1,3 +1,3 @@
 """First-order lag of amplifier or averaging in front of the actuator."""
 
-SOURCES = {"blocks": ("lag{}.c", "exact.c", "braked{}.c"), "drives": ("quiet.c", "steady{}.c")}
+SOURCES = {"blocks": ("lag.c", "exact.c"), "drives": ("braked.c", "quiet.c", "steady.c")}

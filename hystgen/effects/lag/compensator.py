@@ -6,15 +6,15 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import N, Scalar, jit
+from hystgen.basics.jit import N, Scalar, inside, jit
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Block, Place, decays
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import BlockKind, Constants, added
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, zero
@@ -150,7 +150,7 @@ def shifted(theta: float, turning: bool = False) -> float:
     return 1.0 + theta + theta**3 / (1.0 - theta + theta * theta)
 
 
-# ---------------------------------------------------------------- lag.c, lag_exact.c
+# ---------------------------------------------------------------- lag.c, exact.c
 
 HALVES = 16
 """[steps] Halvings of the search for a lead. The lead found is at most 2^-16 of the lead too small, which costs less
@@ -198,26 +198,34 @@ class ExactState(Struct):
     before: Real  # input of the last sample
 
 
-KIND = Kind("lag", LagTable, LagState, reading=("solve", "absorb"), own=("rest", "solve", "absorb"))
+KIND = BlockKind("lag", LagTable, LagState, own=("rest", "solve", "absorb"))
 BRAKED_KIND = replace(KIND, name="braked", state=BrakedState, like=KIND.name)
-EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState)
+EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState, reading=("solve", "absorb"))
 
 
-class LagTables(NamedTuple):
+L = TypeVar("L", bound=Struct)
+X = TypeVar("X", bound=Struct)
+
+
+class EitherTables(NamedTuple, Generic[L, X]):
     """All lags of a model: `exact` (k,), 1 for a lag that is inverted exactly, with its constants in `inverted` (k,),
     else in `led` (k,); `braked`: 1 if the only lag is kept from overshooting behind a slew limit."""
 
     exact: Counts
-    led: LagTable
-    inverted: ExactTable
+    led: L
+    inverted: X
     braked: int
 
 
-class LagMemory(NamedTuple):
+class EitherMemory(NamedTuple, Generic[L, X]):
     """Memory of all lags: of each lag as a led lag, and as a lag that is inverted exactly."""
 
-    led: BrakedState
-    inverted: ExactState
+    led: L
+    inverted: X
+
+
+LagTables = EitherTables[LagTable, ExactTable]
+LagMemory = EitherMemory[BrakedState, ExactState]
 
 
 def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]], braked: int = 0) -> LagTables:
@@ -275,16 +283,13 @@ def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
         s.inverted.before[j] = x
         return s.inverted.reached[j]
     high = s.led.high[j]
-    change = t.led.rate[j] * (x - high) + s.led.low[j]
-    following = high + change
-    s.led.high[j] = following
-    s.led.low[j] = change - (following - high)
+    following = added(s.led, j, t.led.rate[j] * (x - high))
     s.led.wanted[j] = s.led.asked[j] + t.led.late[j] * (x - s.led.answer[j])
     s.led.earlier[j] = s.led.asked[j]
     return following - t.led.theta[j] * (following - high)
 
 
-# ---------------------------------------------------------------- lag_steady.c
+# ---------------------------------------------------------------- steady.c
 
 
 @jit
@@ -300,7 +305,7 @@ def steady_led(way: N, moved: N) -> N:
     least = most - most
     if most < 0:
         least, most = most, least
-    return least if way < least else most if way > most else way
+    return inside(way, least, most)
 
 
 @jit
@@ -363,12 +368,7 @@ def braked(
     room = short + (-missed if missed < 0 else missed) * t.led.inverse_rate[0]
     if not room > 0:
         return near
-    move = s.led.asked[0] - s.led.earlier[0]
-    way: Scalar = move
-    if move > rising:
-        way = rising
-    elif move < -falling:
-        way = -falling
+    way: Scalar = inside(s.led.asked[0] - s.led.earlier[0], -falling, rising)
     left = (s.led.asked[0] - s.led.high[0]) + (t.led.theta[0] * way - way)
     ahead = near - (s.led.high[0] + way * t.led.inverse_rate[0])
     down = left < 0
@@ -398,9 +398,7 @@ def braked_over(
             else:
                 high = middle
         over = lead - low
-    if over > room:
-        return room
-    return -room if over < -room else over
+    return inside(over, -room, room)
 
 
 @jit

@@ -10,20 +10,27 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
-from hystgen.effects.kinds import VERBS, Constants
+from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, shifted, steady_led
+from hystgen.effects.lag.compensator import (
+    HALVES,
+    EitherMemory,
+    EitherTables,
+    LagNumbers,
+    LagSizes,
+    shifted,
+    steady_led,
+)
 from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import zero
 
 EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which rounding cannot stall."""
@@ -71,25 +78,13 @@ class FixedExactState(Struct):
     before: Int64  # input of the last sample
 
 
-KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState, reading=VERBS)
+KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState)
 BRAKED_KIND = replace(KIND, name="braked", state=FixedBrakedState, like=KIND.name)
 EXACT_KIND = replace(KIND, name="lag_exact", table=FixedExactTable, state=FixedExactState)
 
 
-class FixedLagTables(NamedTuple):
-    """All lags of a model, as in floating point."""
-
-    exact: Counts
-    led: FixedLagTable
-    inverted: FixedExactTable
-    braked: int
-
-
-class FixedLagMemory(NamedTuple):
-    """Memory of all lags, as in floating point."""
-
-    led: FixedBrakedState
-    inverted: FixedExactState
+FixedLagTables = EitherTables[FixedLagTable, FixedExactTable]
+FixedLagMemory = EitherMemory[FixedBrakedState, FixedExactState]
 
 
 def constants(t: FixedLagTables) -> Iterator[Constants]:
@@ -167,7 +162,7 @@ def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTa
     return FixedLagTables(exact, FixedLagTable.of(rows), FixedExactTable.of(rows), about.braked)
 
 
-# ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
+# ---------------------------------------------------------------- lag.c, exact.c
 
 COARSE = 2**30 - 1
 """Largest number in the search for a lead, so that the square of a sum of two such numbers fits in 64 bits."""
@@ -226,7 +221,7 @@ def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
     return nearest(s.led.high[j] - scaled(t.led, j, change, t.led.theta), t.led.bits[j])
 
 
-# ---------------------------------------------------------------- lag_steady_fixed.c
+# ---------------------------------------------------------------- steady.c
 
 
 @jit
@@ -274,7 +269,7 @@ def steady_absorb(s: FixedLagMemory, before: int) -> None:
     """Note that the lag has moved; sums are exact, so no remainder can take it back."""
 
 
-# ---------------------------------------------------------------- braked_fixed.c
+# ---------------------------------------------------------------- braked.c
 
 
 @jit
@@ -287,12 +282,7 @@ def braked(
     room = short + scaled(t.led, 0, -missed if missed < 0 else missed, t.led.inverse_rate)
     if room + room < code:
         return near
-    move = s.led.asked[0] - s.led.earlier[0]
-    way = move
-    if move > rising << bits:
-        way = rising << bits
-    elif move < -falling << bits:
-        way = -falling << bits
+    way = inside(s.led.asked[0] - s.led.earlier[0], -falling << bits, rising << bits)
     more = s.led.asked[0] - s.led.high[0] + scaled(t.led, 0, way, t.led.theta) - way
     down = nearest(way, bits) + falling
     left = coarse(nearest(more, bits), drop)
@@ -310,10 +300,7 @@ def braked_over(t: FixedLagTables, size: int, lead: int, back: int, room: int, d
     most = coarsely(t, size, drop) if size <= margin else size
     if most > margin:
         most = braked_lead(size, lead, margin, coarsely(t, back, drop))
-    over = lead - most
-    if over > room:
-        return room
-    return -room if over < -room else over
+    return inside(lead - most, -room, room)
 
 
 @jit
@@ -335,10 +322,8 @@ def braked_lead(size: int, lead: int, margin: int, way: int) -> int:
 @jit
 def coarse(x: int, drop: int) -> int:
     """A signal as a coarse number of the search."""
-    x = x >> drop
-    if x > COARSE:
-        return zero(x) + COARSE
-    return zero(x) - COARSE if x < -COARSE else x
+    most = zero(x) + COARSE
+    return inside(x >> drop, -most, most)
 
 
 @jit

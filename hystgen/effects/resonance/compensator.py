@@ -16,7 +16,7 @@ import numpy as np
 from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
-from hystgen.effects.kinds import Kind, numbered
+from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import zero
@@ -112,7 +112,7 @@ class ModeState(Struct):
     rate: Signal  # of `off`, per radian of the mode
 
 
-KIND = Kind("mode", ModeTable, ModeState, reading=("absorb",), own=("rest", "absorb"))
+KIND = BlockKind("mode", ModeTable, ModeState, reading=("absorb",), own=("rest", "absorb"))
 
 
 def tables(modes: Sequence[ModeNumbers], about: FloatSurroundings) -> ModeTable:

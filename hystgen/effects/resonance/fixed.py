@@ -89,7 +89,7 @@ class ModeFormats(Coded):
         return rounding(self.one, self.row, size / signal) * signal
 
 
-# ---------------------------------------------------------------- mode_fixed.c
+# ---------------------------------------------------------------- mode.c
 
 
 mode_rest = compensator.mode_rest  # nothing in it is rounded

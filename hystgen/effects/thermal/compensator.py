@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hystgen.basics.jit import N, Scalar, jit
+from hystgen.basics.jit import Answer, N, Scalar, inside, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, firsts, memory_of
 from hystgen.effects.base import Place
-from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
-from hystgen.effects.kinds import Constants, Kind, Rows, numbered
+from hystgen.effects.gains import (
+    FLOATING,
+    LARGEST_GAIN,
+    LEAST_GAIN,
+    MOST_CHANGE,
+    GainLimits,
+    Gains,
+    following,
+    newton_steps,
+    too_fast,
+)
+from hystgen.effects.kinds import B, BlockKind, Constants, Rows, added, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -42,14 +52,10 @@ class GainTable(Struct):
     reference: Real
     coldest: Real
     hottest: Real
-    least: Real
-    largest: Real
 
 
-class GainNumbers(GainTable):
-    """The same with a constant that is not in the table in C."""
-
-    one: Real
+class GainNumbers(GainTable, GainLimits):
+    """The same with constants that are not in the table in C."""
 
 
 class GainState(Struct):
@@ -60,7 +66,7 @@ class GainState(Struct):
     offset: Signal
 
 
-KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
+KIND = BlockKind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,7 @@ class Warm(One):
 def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
     """The tables of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
-    given = [(*numbers(each, about.span), LEAST_GAIN, LARGEST_GAIN, 1.0) for each in effects]
+    given = [(*FLOATING.limits, *numbers(each, about.span)) for each in effects]
     rows = about.reals(given, "temperatures")
     return GainNumbers.of(rows, rows.dtype)
 
@@ -120,51 +126,40 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, fl
     )
 
 
-@jit
-def gain_reset(t: GainNumbers, s: GainState, j: int) -> None:
-    """Return to the state of the parameter file: gain 1, offset 0."""
-    s.gain[j] = t.one[j]
-    s.inverse[j] = t.one[j]
-    s.offset[j] = zero(t.one[j])
+def gain_verbs(by: Gains) -> Verbs:
+    """The verbs of a gain in an arithmetic."""
+    times, reciprocal, scaled, given = by.times, by.reciprocal, by.scaled, by.given
 
+    @jit
+    def reset(t: GainNumbers, s: GainState, j: int) -> None:
+        """Return to the state of the parameter file: gain 1, offset 0."""
+        s.gain[j] = t.one[j]
+        s.inverse[j] = t.one[j]
+        s.offset[j] = zero(t.one[j])
 
-@jit
-def gain_set(t: GainNumbers, s: GainState, j: int, gain: Scalar) -> bool:
-    """Set the gain. Returns whether it had to be limited."""
-    inside = gain
-    if inside < t.least[j]:
-        inside = t.least[j]
-    elif inside > t.largest[j]:
-        inside = t.largest[j]
-    s.gain[j] = inside
-    s.inverse[j] = t.one[j] / inside
-    return bool(inside != gain)
+    @jit
+    def heat(t: GainNumbers, s: GainState, j: int, temperature: Scalar) -> bool:
+        """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
+        asked = given(t, j, temperature)
+        taken = inside(asked, t.coldest[j], t.hottest[j])
+        above = taken - t.reference[j]
+        wanted = t.one[j] + scaled(above, t.per_degree, j)
+        s.offset[j] = scaled(above, t.offset_per_degree, j)
+        s.gain[j] = inside(wanted, t.least[j], t.largest[j])
+        s.inverse[j] = reciprocal(t.one[j], s.gain[j])
+        return bool(s.gain[j] != wanted or taken != asked)
 
+    @jit(inline=True)
+    def solve(t: GainNumbers, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The input that gives the output y."""
+        return times(y - s.offset[j], s.inverse[j])
 
-@jit
-def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Scalar) -> bool:
-    """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
-    inside = temperature
-    if inside < t.coldest[j]:
-        inside = t.coldest[j]
-    elif inside > t.hottest[j]:
-        inside = t.hottest[j]
-    above = inside - t.reference[j]
-    s.offset[j] = t.offset_per_degree[j] * above
-    limited = gain_set(t, s, j, t.one[j] + t.per_degree[j] * above)
-    return bool(limited or inside != temperature)
+    @jit(inline=True)
+    def absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The output for the input x."""
+        return times(x, s.gain[j]) + s.offset[j]
 
-
-@jit(inline=True)
-def gain_solve(t: GainNumbers, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return (y - s.offset[j]) * s.inverse[j]
-
-
-@jit(inline=True)
-def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return s.gain[j] * x + s.offset[j]
+    return Verbs(memory_of(GainState), absorb=absorb, solve=solve, reset=reset, set_temperature=heat)
 
 
 # ---------------------------------------------------------------- heat.c
@@ -181,11 +176,8 @@ class HeatTable(Struct):
     turns: Count  # Newton steps for the reciprocal of a gain that has changed
 
 
-class HeatNumbers(HeatTable):
+class HeatNumbers(HeatTable, GainLimits):
     """The same with constants that are not in the table in C."""
-
-    one: Real
-    two: Real
 
 
 class HeatState(Struct):
@@ -198,7 +190,7 @@ class HeatState(Struct):
     offset: Real
 
 
-HEAT_KIND = Kind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
+HEAT_KIND = BlockKind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
 
 
 class FrictionPlay(Struct):
@@ -213,6 +205,13 @@ class FrictionTable(Struct):
     n: Count
 
 
+class FrictionNumbers(FrictionTable):
+    """The same with constants that are not in the table in C."""
+
+    one: Signal
+    two: Signal
+
+
 class FrictionPlayState(Struct):
     """A play that rubs."""
 
@@ -225,7 +224,7 @@ class FrictionState(Struct):
     begun: Flag  # the plays have positions
 
 
-FRICTION_KIND = Kind(
+FRICTION_KIND = BlockKind(
     "friction", FrictionTable, FrictionState, Rows("play", FrictionPlay, FrictionPlayState), reading=(), own=()
 )
 
@@ -235,22 +234,29 @@ largest rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rat
 the error in that test, with 16 it is 5.3 times."""
 
 
-class HeatTables(NamedTuple):
+F = TypeVar("F", bound=Struct)
+
+
+class RubbingTables(NamedTuple, Generic[B, F]):
     """Own heat of a model: `block` (k,); `friction` (k,), without plays if the drive's square is the heat; `play` (m,):
     the rubbing plays, those of each block from `first` (k + 1) on."""
 
-    block: HeatNumbers
-    friction: FrictionTable
+    block: B
+    friction: F
     first: Counts
     play: FrictionPlay
 
 
-class HeatMemory(NamedTuple):
+class RubbingMemory(NamedTuple, Generic[B]):
     """Memory of all blocks: `block` (k,), and of the rubbing plays, `friction` (k,) and `play` (m,)."""
 
-    block: HeatState
+    block: B
     friction: FrictionState
     play: FrictionPlayState
+
+
+HeatTables = RubbingTables[HeatNumbers, FrictionNumbers]
+HeatMemory = RubbingMemory[HeatState]
 
 
 def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
@@ -386,25 +392,15 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     ends, seconds = about.ends, about.seconds
     turns = [newton_steps(heat_change(each, ends, seconds), about.roundoff) for each in effects]
     widths = [thresholds(each, ends) for each in effects]
-    rows = about.reals([(*heat_numbers(e, ends, about.span, seconds), 1.0, 2.0) for e in effects], "temperatures")
+    given = [(*FLOATING.limits, *heat_numbers(each, ends, about.span, seconds)) for each in effects]
+    rows = about.reals(given, "temperatures")
     play = about.reals([(r,) for each in widths for r in each], "thresholds")
     return HeatTables(
-        HeatNumbers.of([(*row[:-2], n, *row[-2:]) for row, n in zip(rows, turns, strict=True)], rows.dtype),
-        FrictionTable.of([(len(each),) for each in widths]),
+        HeatNumbers.of([(*row, n) for row, n in zip(rows, turns, strict=True)], rows.dtype),
+        FrictionNumbers.of([(len(each), 1.0, 2.0) for each in widths], rows.dtype),
         firsts(map(len, widths)),
         FrictionPlay.of(play, play.dtype),
     )
-
-
-@jit
-def heat_reset(t: HeatTables, s: HeatMemory, j: int) -> None:
-    """Return to the temperature of the surroundings."""
-    s.block.high[j] = zero(t.block.one[j])
-    s.block.low[j] = zero(t.block.one[j])
-    s.block.gain[j] = t.block.one[j]
-    s.block.inverse[j] = t.block.one[j]
-    s.block.offset[j] = zero(t.block.one[j])
-    s.friction.begun[j] = 0
 
 
 @jit
@@ -415,70 +411,90 @@ def heat_way(before: N, v: N) -> N:
 
 
 @jit
-def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> None:
-    """Note that the drive has moved from `before` to v."""
-    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
-    high = s.block.high[j]
-    change = (t.block.per_amount[j] * amount - t.block.rate[j] * high) + s.block.low[j]
-    following = high + change
-    s.block.high[j] = following
-    s.block.low[j] = change - (following - high)
-    rise = t.block.hottest[j] if following > t.block.hottest[j] else following
-    gain = t.block.one[j] + t.block.per_degree[j] * rise
-    inverse: Scalar = s.block.inverse[j]
-    for _ in range(t.block.turns[j]):
-        inverse = inverse * (t.block.two[j] - gain * inverse)
-    s.block.gain[j] = gain
-    s.block.inverse[j] = inverse
-    s.block.offset[j] = t.block.offset_per_degree[j] * rise
+def warmed(t: HeatNumbers, s: HeatState, j: int, amount: Scalar) -> Scalar:
+    """Take the heat of a step. Returns the temperature rise."""
+    return added(s, j, t.per_amount[j] * amount - t.rate[j] * s.high[j])
 
 
-@jit(inline=True)
-def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return (y - s.block.offset[j]) * s.block.inverse[j]
+def heat_verbs(
+    by: Gains, memory: Callable[..., object], warmed: Answer, narrowed: Answer, entered: Answer
+) -> Verbs:
+    """The verbs of own heat in an arithmetic. `warmed`: as above; `narrowed`: a gain within limits from which rounding
+    may have taken it; `entered`: a drive as a position of the rubbing plays."""
+    times, scaled, put, followed, rub = by.times, by.scaled, by.put, following(by), friction_move(entered)
 
+    @jit
+    def reset(t: HeatTables, s: HeatMemory, j: int) -> None:
+        """Return to the temperature of the surroundings."""
+        put(s.block, j, zero(t.block.one[j]))
+        s.block.gain[j] = t.block.one[j]
+        s.block.inverse[j] = t.block.one[j]
+        s.block.offset[j] = zero(t.block.one[j])
+        s.friction.begun[j] = 0
 
-@jit(inline=True)
-def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return s.block.gain[j] * x + s.block.offset[j]
+    @jit
+    def move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> None:
+        """Note that the drive has moved from `before` to v."""
+        amount = rub(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
+        warm = warmed(t.block, s.block, j, amount)
+        rise = t.block.hottest[j] if warm > t.block.hottest[j] else warm
+        gain = narrowed(t.block, j, t.block.one[j] + scaled(rise, t.block.per_degree, j))
+        s.block.gain[j] = gain
+        s.block.inverse[j] = followed(gain, s.block.inverse[j], t.block.two[j], t.block.turns[j])
+        s.block.offset[j] = scaled(rise, t.block.offset_per_degree, j)
+
+    @jit(inline=True)
+    def solve(t: HeatTables, s: HeatMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The input that gives the output y."""
+        return times(y - s.block.offset[j], s.block.inverse[j])
+
+    @jit(inline=True)
+    def absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
+        """The output for the input x."""
+        return times(x, s.block.gain[j]) + s.block.offset[j]
+
+    return Verbs(memory, absorb=absorb, solve=solve, reset=reset, move=move)
 
 
 # ---------------------------------------------------------------- friction.c
 
-def friction_constants(t: Any, kind: Kind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
+def friction_constants(t: Any, kind: BlockKind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
     """The rubbing plays of each block, with `each` products per play; None if the block has none."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])
         yield Constants(kind, row, (each * n, 0), t.play[first : first + n]) if n else None
 
 
-@jit
-def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
-    """Move the drive to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
-    threshold as an odd multiple of the first. If a play stays, so do those with larger thresholds."""
-    one = t.block.one[j]
-    if not s.friction.begun[j]:
-        s.friction.begun[j] = 1
+def friction_move(entered: Answer) -> Answer:
+    """A function that moves the drive to v; at first the plays rest at `before`. It returns the sum of their moves,
+    each times its threshold as an odd multiple of the first. If a play stays, so do those with larger thresholds.
+    `entered`: a drive as a position of the plays."""
+
+    @jit
+    def move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
+        if not s.friction.begun[j]:
+            s.friction.begun[j] = 1
+            for i in range(t.first[j], t.first[j + 1]):
+                s.play.at[i] = entered(t.friction, j, before)
+        x = entered(t.friction, j, v)
+        amount = zero(x)
+        odd = t.friction.one[j]
         for i in range(t.first[j], t.first[j + 1]):
-            s.play.at[i] = before
-    amount = zero(v)
-    odd = one
-    for i in range(t.first[j], t.first[j + 1]):
-        r = t.play.threshold[i]
-        at = s.play.at[i]
-        if v - r > at:
-            to = v - r
-            amount = amount + odd * (to - at)
-        elif v + r < at:
-            to = v + r
-            amount = amount + odd * (at - to)
-        else:
-            break
-        s.play.at[i] = to
-        odd = odd + t.block.two[j]
-    return amount
+            r = t.play.threshold[i]
+            at = s.play.at[i]
+            if x - r > at:
+                to = x - r
+                amount = amount + odd * (to - at)
+            elif x + r < at:
+                to = x + r
+                amount = amount + odd * (at - to)
+            else:
+                break
+            s.play.at[i] = to
+            odd = odd + t.friction.two[j]
+        return amount
+
+    return move
 
 
 # ---------------------------------------------------------------- at steps of any length
@@ -521,12 +537,9 @@ class UnevenHeat:
             _, self.depth, self.up = self._heat(before, drive, seconds)
 
 
-ARITHMETIC = Realized(
-    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    numbered(KIND, 1, 1), tables, kinds=(KIND,),
-)
+ARITHMETIC = Realized(gain_verbs(FLOATING), numbered(KIND, 1, 1), tables, kinds=(KIND,))
 HEAT_ARITHMETIC = Realized(
-    Verbs(memory_of(HeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_verbs(FLOATING, memory_of(HeatMemory), warmed, FLOATING.given, FLOATING.given),
     numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 

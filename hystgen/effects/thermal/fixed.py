@@ -6,38 +6,34 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import inside, jit
 from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.gains import (
+    FIXED,
     GAIN_BITS,
-    LARGEST,
     LARGEST_GAIN,
-    LEAST,
     LEAST_GAIN,
     ONE,
     RECIPROCAL_ERROR,
-    followed,
+    GainLimits,
     newton_steps,
-    reciprocal,
 )
 from hystgen.effects.kinds import numbered
-from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
+    FrictionNumbers,
     FrictionPlay,
-    FrictionPlayState,
-    FrictionState,
     FrictionTable,
-    GainState,
+    RubbingMemory,
+    RubbingTables,
     Warm,
-    heat_way,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Counts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain that is linear in a temperature: one product."""
@@ -64,18 +60,23 @@ class FixedGainTable(Struct):
     bits: UInt8  # of a temperature below a code
 
 
+class FixedGainNumbers(FixedGainTable, GainLimits):
+    """The same with constants that are not in the table in C."""
+
+
 KIND = replace(floating.KIND, table=FixedGainTable)
 
 
-def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
+def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainNumbers:
     """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: of a
     temperature below a code; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
     for per_degree, offset_per_degree, *ends in rows:
         rates = factor(per_degree * ONE / whole), factor(offset_per_degree * level / whole)
-        found.append((*rates, *(round(min(max(end, -degrees), degrees) * whole) for end in ends), bits))
-    return FixedGainTable.of(found)
+        limits = (round(min(max(end, -degrees), degrees) * whole) for end in ends)
+        found.append((*FIXED.limits, *rates, *limits, bits))
+    return FixedGainNumbers.of(found)
 
 
 @dataclass(frozen=True)
@@ -107,58 +108,13 @@ def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
     return GainFormats(one, floating.numbers(effect, about.span))
 
 
-def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainTable:
+def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainNumbers:
     """The tables of several gains, by `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
 
 
-# ---------------------------------------------------------------- gain_fixed.c
-
-
-@jit
-def gain_reset(t: FixedGainTable, s: GainState, j: int) -> None:  # noqa: ARG001  used in floating point
-    """Return to the state of the parameter file: gain 1, offset 0."""
-    s.gain[j] = ONE
-    s.inverse[j] = ONE
-    s.offset[j] = zero(s.offset[j])
-
-
-@jit
-def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: int) -> bool:
-    """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
-    given = temperature << t.bits[j]
-    inside = given
-    if inside < t.coldest[j]:
-        inside = t.coldest[j]
-    elif inside > t.hottest[j]:
-        inside = t.hottest[j]
-    above = inside - t.reference[j]
-    s.offset[j] = times(above, t.offset_per_degree.mantissa[j], t.offset_per_degree.shift[j])
-    wanted = ONE + times(above, t.per_degree.mantissa[j], t.per_degree.shift[j])
-    gain = wanted
-    if gain < LEAST:
-        gain = zero(wanted) + LEAST
-    elif gain > LARGEST:
-        gain = zero(wanted) + LARGEST
-    s.gain[j] = gain
-    s.inverse[j] = reciprocal(gain)
-    return bool(gain != wanted or inside != given)
-
-
-@jit
-def gain_solve(t: FixedGainTable, s: GainState, j: int, y: int) -> int:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return times(y - s.offset[j], s.inverse[j], GAIN_BITS)
-
-
-@jit
-def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: int) -> int:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return times(x, s.gain[j], GAIN_BITS) + s.offset[j]
-
-
-# ---------------------------------------------------------------- heat_fixed.c
+# ---------------------------------------------------------------- heat.c
 
 RISE_BITS = 59
 """Bits of the largest temperature rise that a drive can cause."""
@@ -182,10 +138,14 @@ class FixedHeatTable(Struct):
     drop: UInt8  # and bits that products with the temperature drop
 
 
+class FixedHeatNumbers(FixedHeatTable, GainLimits):
+    """The same with constants that are not in the table in C."""
+
+
 class FixedHeatState(Struct):
     """A block."""
 
-    rise: Int64  # temperature above the surroundings
+    high: Int64  # temperature above the surroundings
     gain: Int32
     inverse: Int32
     offset: Int64
@@ -200,24 +160,15 @@ class FixedFrictionTable(FrictionTable):
     bits: UInt8  # of a play below a drive code
 
 
+class FixedFrictionNumbers(FixedFrictionTable, FrictionNumbers):
+    """The same with constants that are not in the table in C."""
+
+
 FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
 
 
-class FixedHeatTables(NamedTuple):
-    """Own heat of a model, as in floating point."""
-
-    block: FixedHeatTable
-    friction: FixedFrictionTable
-    first: Counts
-    play: FrictionPlay
-
-
-class FixedHeatMemory(NamedTuple):
-    """Memory of all blocks, as in floating point."""
-
-    block: FixedHeatState
-    friction: FrictionState
-    play: FrictionPlayState
+FixedHeatTables = RubbingTables[FixedHeatNumbers, FixedFrictionNumbers]
+FixedHeatMemory = RubbingMemory[FixedHeatState]
 
 
 @dataclass(frozen=True)
@@ -285,93 +236,34 @@ def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
 def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
     """The tables of several blocks."""
     return FixedHeatTables(
-        FixedHeatTable.of([one.table for one in rows]),
-        FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
+        FixedHeatNumbers.of([(*FIXED.limits, *one.table) for one in rows]),
+        FixedFrictionNumbers.of([(len(one.thresholds), 1, 2, one.bits) for one in rows]),
         firsts(len(one.thresholds) for one in rows),
         FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
 
 
 @jit
-def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa: ARG001  used in floating point
-    """Return to the temperature of the surroundings."""
-    s.block.rise[j] = zero(s.block.rise[j])
-    s.block.gain[j] = ONE
-    s.block.inverse[j] = ONE
-    s.block.offset[j] = zero(s.block.rise[j])
-    s.friction.begun[j] = 0
+def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
+    """Take the heat of a step. Returns the temperature rise without its lowest bits."""
+    warmer = times(nearest(amount, t.coarse[j]), t.per_amount.mantissa[j], t.per_amount.shift[j]) << t.lift[j]
+    lost = times(s.high[j] >> t.drop[j], t.rate.mantissa[j], t.rate.shift[j])
+    s.high[j] = s.high[j] + (warmer - lost)
+    return s.high[j] >> t.drop[j]
 
 
 @jit
-def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> None:
-    """Note that the drive has moved from `before` to v."""
-    n = t.block
-    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
-    warmer = times(nearest(amount, n.coarse[j]), n.per_amount.mantissa[j], n.per_amount.shift[j]) << n.lift[j]
-    lost = times(s.block.rise[j] >> n.drop[j], n.rate.mantissa[j], n.rate.shift[j])
-    s.block.rise[j] = s.block.rise[j] + (warmer - lost)
-    warm = s.block.rise[j] >> n.drop[j]
-    rise = n.hottest[j] if warm > n.hottest[j] else warm
-    gain = ONE + times(rise, n.per_degree.mantissa[j], n.per_degree.shift[j])
-    if gain < LEAST:
-        gain = zero(gain) + LEAST
-    elif gain > LARGEST:
-        gain = zero(gain) + LARGEST
-    s.block.offset[j] = times(rise, n.offset_per_degree.mantissa[j], n.offset_per_degree.shift[j])
-    s.block.inverse[j] = followed(gain, s.block.inverse[j], n.turns[j])
-    s.block.gain[j] = gain
+def narrowed(t: FixedHeatNumbers, j: int, gain: int) -> int:
+    """A gain within limits, from which rounding may have taken it."""
+    return inside(gain, t.least[j], t.largest[j])
 
-
-@jit
-def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: int) -> int:  # noqa: ARG001  block interface
-    """The input that gives the output y."""
-    return times(y - s.block.offset[j], s.block.inverse[j], GAIN_BITS)
-
-
-@jit
-def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: int) -> int:  # noqa: ARG001  block interface
-    """The output for the input x."""
-    return times(x, s.block.gain[j], GAIN_BITS) + s.block.offset[j]
-
-
-# ---------------------------------------------------------------- friction_fixed.c
 
 STATE_BITS = 31
 """Bits of a rubbing play, excluding its sign; a drive takes 15 or 31 of them."""
 
-@jit
-def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> int:
-    """As in floating point."""
-    bits = t.friction.bits[j]
-    if not s.friction.begun[j]:
-        s.friction.begun[j] = 1
-        for i in range(t.first[j], t.first[j + 1]):
-            s.play.at[i] = before << bits
-    x = v << bits
-    amount = zero(x)
-    odd = 1
-    for i in range(t.first[j], t.first[j + 1]):
-        r = t.play.threshold[i]
-        at = s.play.at[i]
-        if x - r > at:
-            to = x - r
-            amount = amount + odd * (to - at)
-        elif x + r < at:
-            to = x + r
-            amount = amount + odd * (at - to)
-        else:
-            break
-        s.play.at[i] = to
-        odd += 2
-    return amount
-
-
-ARITHMETIC = Realized(
-    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    numbered(KIND, 2, 2), made, formats, kinds=(KIND,),
-)
+ARITHMETIC = Realized(floating.gain_verbs(FIXED), numbered(KIND, 2, 2), made, formats, kinds=(KIND,))
 HEAT_ARITHMETIC = Realized(
-    Verbs(memory_of(FixedHeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    floating.heat_verbs(FIXED, memory_of(FixedHeatMemory), warmed, narrowed, FIXED.given),
     numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
     functools.partial(floating.friction_constants, kind=FRICTION_KIND, each=2),
 )
