@@ -1352,7 +1352,7 @@ def test_show_lists_effects_and_what_they_mean(run: Callable[..., tuple[int, str
     path.write_text(FILE + "    - {name: lag, time_constant: 0.0125}\n" + rate)
     code, out, err = run("show", path, "--plot", tmp_path / "stage.svg")
     assert (code, err) == (0, "")
-    assert "lag\n        time_constant = 0.0125: tau, s; 0 is no lag\n        compensation: a lead, exact on" in out
+    assert "lag\n        time_constant = 0.0125: tau, s; 0 for no lag\n        compensation: a lead, exact on" in out
     assert "rate_dependence, threshold\n        betas = [0.3, 0.2, 0.1]: " in out
     assert "thresholds stay in order up to |w'| = 4.5 per second" in out
     assert "inverse  " not in out

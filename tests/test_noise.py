@@ -284,13 +284,13 @@ def test_more_noise_than_anyone_wants_has_to_be_allowed() -> None:
 )  # fmt: skip
 def test_effects_that_are_over_within_a_sample_are_told(effect: str) -> None:
     """Effects just below a 50th of a sample are reported; slower effects, or those next to a slow one, are not."""
-    (said,) = (each for each in told(of(effect, seconds="50.0")) if each.startswith("Effects are over"))
+    (said,) = (each for each in told(of(effect, seconds="50.0")) if each.startswith("Effects die out"))
     name = effect.partition(",")[0].removeprefix("name: ")
     assert f"the slowest, {name}, takes 0.9" in said
     assert "5e-05 for 50 us" in said
     slow = "name: lag, time_constant: 20" if name == "creep" else CREEP
     for other in (of(effect, seconds="49.0"), of(effect, slow, seconds="50.0")):
-        assert not any(each.startswith("Effects are over") for each in told(other))
+        assert not any(each.startswith("Effects die out") for each in told(other))
 
 
 def test_an_inverse_without_a_bound_states_the_error_found() -> None:

@@ -209,5 +209,5 @@ class TestCommand:
 
     @pytest.mark.parametrize("within", [0.0, 1.0, math.nan, "1 %"])
     def test_a_wrong_share(self, tmp_path: Path, within: float) -> None:
-        with pytest.raises((TypeError, ValueError), match="within is a"):
+        with pytest.raises((TypeError, ValueError), match="within must be"):
             model_of(tmp_path).settling(within)
