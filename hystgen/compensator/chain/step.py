@@ -223,7 +223,7 @@ def made_of(
             s.plays.step.bits[0] |= DOMAIN
         return v
 
-    # ---------------------------------------------------------------- lag_steady.c, lag_steady_fixed.c
+    # ---------------------------------------------------------------- steady.c
 
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
