@@ -174,7 +174,7 @@ def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
         ({"emission": {"arithmetics": "q15"}}, TypeError, "did you mean arithmetic"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.identify_batch(REC, tmp_path / "o", **options), error, words)
-    refused(lambda: hystgen.report_fit(3, REC, tmp_path / "r"), TypeError, "what hystgen.identify returns")
+    refused(lambda: hystgen.report_fit(3, REC, tmp_path / "r"), TypeError, "a result of hystgen.identify")
     assert not list(tmp_path.iterdir())
 
 
