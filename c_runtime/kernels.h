@@ -42,10 +42,6 @@ void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m, hystge
                             hystgen_real_t output);
 bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                            hystgen_real_t input);
-void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
-                           const hystgen_corner_t *corner, hystgen_real_t output,
-                           hystgen_real_t input);
-bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_real_t input);
 hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, hystgen_real_t input);
 void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,

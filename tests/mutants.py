@@ -95,8 +95,14 @@ KILLED = (
     ),
     Mutant(
         "the limit is met late", FLOAT,
-        "if (t->segment[c->top].reach > room) {",
-        "if (t->segment[c->top].reach > room + room) {",
+        "t->segment[c->top].reach > t->inside[on] - start;",
+        "t->segment[c->top].reach > 2 * (t->inside[on] - start);",
+        "above", "float32",
+    ),
+    Mutant(
+        "a move that stops is looked for among ways alone", FLOAT,
+        "reach > s[middle].reach",
+        "reach > s[middle].way",
         "above", "float32",
     ),
     Mutant(
@@ -107,14 +113,14 @@ KILLED = (
     ),
     Mutant(
         "a step back by rounding goes on", FLOAT,
-        "    cap = back ? x : end;\n",
-        "    cap = end;\n",
+        "        cap = input;\n",
+        "",
         "listed", "float32",
     ),
     Mutant(
         "an answer steps back", FLOAT,
-        "    m->here.output = back ? m->here.output : output;\n",
-        "    m->here.output = output;\n",
+        "        cap = input;\n",
+        "        m->here.output = hystgen_along(m, y);\n",
         "listed", "float32",
     ),
     Mutant(
@@ -131,8 +137,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back beyond the range", FLOAT,
-        "k == 0 && from <= t->range[other] ? m->from",
-        "k == 0 ? m->from",
+        "k == 0 && from <= t->range[other] ?",
+        "k == 0 ?",
         "outside", "float32",
     ),
     Mutant(
@@ -161,8 +167,8 @@ KILLED = (
     ),
     Mutant(
         "a corner is passed only beyond it", FLOAT,
-        "if (m->here.depth > 1u && x >= c->pass[on]) {",
-        "if (m->here.depth > 1u && x > c->pass[on]) {",
+        "if (kept > 0 && x >= corner[kept].pass[on]) {",
+        "if (kept > 0 && x > corner[kept].pass[on]) {",
         "plain", "float32",
     ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),

@@ -121,8 +121,9 @@ def composed(one: EmittedModel) -> Code:
         own_types, own_functions = own.pieces(one.compiled.tables)
     pieces = runtime.operator_pieces(one.variant, operators, front(one), one.calls, own_functions)
     called = sorted(runtime.used(pieces))
-    kernels = runtime.needed([*runtime.table_pieces(family), *runtime.kernel_pieces(family)], called)
     shared = one.options.layout == "shared-runtime"
+    limits = shared or ("inverse" in operators and not (one.variant.fronts or one.variant.chain))
+    kernels = runtime.needed([*runtime.table_pieces(family), *runtime.kernel_pieces(family, limits)], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
     tables: list[runtime.Piece] = []

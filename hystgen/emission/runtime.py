@@ -537,9 +537,9 @@ def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
     return [piece for file in files for piece in _pieces_of(file, frozenset(facts))]
 
 
-def kernel_pieces(family: Family) -> list[Piece]:
-    """Every piece of every kernel file of an arithmetic, callees before callers."""
-    return _pieces(family.kernel_files, family.facts)
+def kernel_pieces(family: Family, limits: bool = True) -> list[Piece]:
+    """Every piece of every kernel file of an arithmetic, callees before callers; `limits`: also for limited plays."""
+    return _pieces(family.kernel_files, family.facts if limits else family.facts | {"HYSTGEN_HAS_NO_LIMIT"})
 
 
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:

@@ -4,10 +4,11 @@
 #endif
 #include "compensator/model.h"
 #include "compensator/clamp.c"
+#include "plays/corners_float.c"
 
 #ifdef HYSTGEN_INVERSE
 /* Any sample that needs a search. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
+HYSTGEN_APART void hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     const hystgen_curve_t *t = &hystgen_operator_curve;
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
@@ -22,12 +23,9 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
         if (self->stepped && self->committed) {
             hystgen_move_to_output(t, m, self->corner, self->returned);
         }
-    } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
-        bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-    } else if ((x < m->here.input || x > m->here.input) &&
-               !hystgen_move_to_input(t, m, self->corner, x)) {
-        hystgen_stop_in_block(t, m, self->corner,
-                              m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
+    } else if ((m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) ||
+               ((x < m->here.input || x > m->here.input) &&
+                hystgen_move_to_input(t, m, self->corner, x))) {
         m->limited = true;
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
@@ -35,7 +33,6 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     self->stepped = true;
     self->committed = false;
     self->status |= bits;
-    return m->here.output;
 }
 
 /* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
@@ -71,7 +68,8 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
             return m->here.output;
         }
     }
-    return hystgen_inverse_search(self, u);
+    hystgen_inverse_search(self, u);
+    return m->here.output;
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {

@@ -12,10 +12,13 @@ from hystgen.plays.corners.corners_float import (
     move_to_input,
     move_to_output,
     start,
-    stop_in_block,
     take_back,
 )
-from hystgen.plays.slots import HELD, INPUT_CLAMPED, OUTPUT_CLAMPED
+from hystgen.plays.slots import (
+    HELD,
+    INPUT_CLAMPED,
+    OUTPUT_CLAMPED,
+)
 
 
 @jit
@@ -30,10 +33,9 @@ def inverse_search(t: Tables, m: Memory, u: Scalar) -> Scalar:
     if bits == HELD:
         if m.step.stepped[0] and m.step.committed[0]:
             move_to_output(t.inverse, m, m.step.returned[0])
-    elif m.plays.limited[0] and (x >= m.here.input[0] if m.here.rising[0] else x <= m.here.input[0]):
-        bits |= OUTPUT_CLAMPED
-    elif x != m.here.input[0] and not move_to_input(t.inverse, m, x):
-        stop_in_block(t.inverse, m, t.limits.drive.high[0] if m.here.rising[0] else t.limits.drive.low[0], x)
+    elif (m.plays.limited[0] and (x >= m.here.input[0] if m.here.rising[0] else x <= m.here.input[0])) or (
+        x != m.here.input[0] and move_to_input(t.inverse, m, x)
+    ):
         m.plays.limited[0] = 1
         bits |= OUTPUT_CLAMPED
     m.step.before[0] = m.here.input[0]

@@ -128,38 +128,33 @@ def take_back(t: Curve, m: Memory) -> None:
 
 
 @jit
-def leave_corner(t: Curve, m: Memory) -> None:
-    """Leave a corner here. A block whose last play would begin to follow only beyond the limit is never passed."""
+def reverse(t: Curve, m: Memory) -> None:
+    """Reverse the move and, if plays have followed, leave a corner. A block whose last play would begin to follow only
+    beyond the limit is never passed."""
     rising = m.here.rising[0]
     k = m.here.k[0]
-    c = m.here.depth[0]
-    x = along(m, m.here.input[0])
-    room = t.limit[1 - rising] + along(m, m.here.output[0])
-    m.corner.output[c] = m.here.output[0]
-    m.corner.passed[c, rising] = x
-    m.corner.passed[c, 1 - rising] = t.literal.most[0] if t.reach[k] > room else t.way[k] - x
-    m.corner.top[c] = k
-    m.corner.rose[c] = rising
-    m.here.depth[0] += 1
-
-
-@jit
-def turn_back(t: Curve, m: Memory) -> None:
-    """Turn back, leaving a corner if plays have followed."""
-    if m.here.k[0] > 0:
-        leave_corner(t, m)
+    if k > 0:
+        c = m.here.depth[0]
+        x = along(m, m.here.input[0])
+        room = t.limit[1 - rising] + along(m, m.here.output[0])
+        m.corner.output[c] = m.here.output[0]
+        m.corner.passed[c, rising] = x
+        m.corner.passed[c, 1 - rising] = t.literal.most[0] if t.reach[k] > room else t.way[k] - x
+        m.corner.top[c] = k
+        m.corner.rose[c] = rising
+        m.here.depth[0] += 1
         m.here.k[0] = 0
-    m.here.rising[0] = 1 - m.here.rising[0]
+    m.here.rising[0] = 1 - rising
     m.plays.limited[0] = 0
     m.plays.sign[0] = -m.plays.sign[0]
 
 
 @jit
-def find_segment(step: Reals, k: int, end: int, way: Scalar) -> int:
-    """The last of segments k .. end - 1 that begins before `way`, as segment k does. `step`: `way` or `reach`."""
+def find_segment(t: Curve, k: int, end: int, way: Scalar, reach: Scalar, both: bool) -> int:
+    """The last of segments k .. end - 1 that begins before a way, and before a reach if `both`, as segment k does."""
     middle = (k + end) // 2
     while middle > k:
-        if way > step[middle]:
+        if (not both or reach > t.reach[middle]) and way > t.way[middle]:
             k = middle
         else:
             end = middle
@@ -168,29 +163,59 @@ def find_segment(step: Reals, k: int, end: int, way: Scalar) -> int:
 
 
 @jit
-def stop_in_block(t: Curve, m: Memory, output: Scalar, to: Scalar) -> None:
-    """End the move in the top corner's block: where the sum is `output`, or at `to` if that comes first."""
-    c = m.here.depth[0] - 1
+def move_or_stop(t: Curve, m: Memory, c: int, x: Scalar, end: Scalar, stop: bool) -> bool:
+    """Move the plays in the block of corner c to the input x, or stop them at the sum `end`: in any case if `stop`,
+    else if it is a limit and comes first. Both are along the move. Returns whether they stop."""
     rising = m.here.rising[0]
-    reach = along(m, output - m.corner.output[c])
-    x: Scalar = m.corner.passed[c, rising]
+    origin = m.corner.passed[c, 1 - rising]
+    cap: Scalar = m.corner.passed[c, rising]
+    after = cap
+    begin = cap
+    y = along(m, m.corner.output[c])
     k = m.here.k[0]
+    limits = stop
     if m.corner.rose[c] != rising:
-        k = find_segment(t.reach, k, m.corner.top[c], reach)
-        reach = reach - t.reach[k]
-        x = t.way[k] - m.corner.passed[c, 1 - rising]
-    x = x + reach * t.slope[k]
-    m.here.input[0] = along(m, x) if x < along(m, to) else to
-    m.here.output[0] = output
+        limits = limits or t.reach[m.corner.top[c]] > t.inside[rising] - y
+        k = find_segment(t, k, m.corner.top[c], x + origin, end - y, limits)
+        begin = t.way[k] - origin
+        y = y + t.reach[k]
+    m.plays.begin[0] = along(m, begin)
+    m.plays.start[0] = along(m, y)
+    m.plays.gain[0] = t.gain[k]
     m.here.k[0] = k
-    forget_line(m)
+    output = end if stop else y + (x - begin) * t.gain[k]
+    if stop or output > end:
+        to = begin + (end - y) * t.slope[k]
+        m.here.input[0] = along(m, to if to < x else x)
+        m.here.output[0] = along(m, end)
+        forget_line(m)
+        return True
+    m.here.input[0] = along(m, x)
+    m.plays.behind[0] = m.here.input[0]
+    if m.corner.rose[c] != rising:
+        after = t.way[k + 1] - origin
+        cap = after if m.corner.rose[c] == BOTTOM else cap
+        if limits:
+            cap = begin + (t.inside[rising] - y) * t.slope[k]
+        m.plays.from_input[0] = -along(m, origin)
+        m.plays.from_output[0] = m.corner.output[c]
+        if k == 0 and origin <= t.range[1 - rising]:
+            m.plays.behind[0] = m.plays.from_input[0]
+    if output < along(m, m.here.output[0]):
+        cap = x
+    else:
+        m.here.output[0] = along(m, output)
+        cap = t.range[rising] if t.range[rising] < cap else cap
+    m.plays.cap[0] = along(m, cap)
+    m.plays.next[0] = along(m, after if after < cap else cap)
+    return False
 
 
 @jit
 def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
     """Move the plays until their sum is `output`, up to rounding."""
     if along(m, output) < along(m, m.here.output[0]):
-        turn_back(t, m)
+        reverse(t, m)
     rising = m.here.rising[0]
     kept = 0
     while m.here.depth[0] - kept > 1:
@@ -202,18 +227,19 @@ def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
         else:
             kept = middle
     m.plays.limited[0] = 0
-    stop_in_block(t, m, output, along(m, t.literal.most[0]))
+    move_or_stop(t, m, kept, t.literal.most[0], along(m, output), True)
 
 
 @jit
 def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
-    """Move the plays to any input. False if the limit comes first; the caller then stops them there."""
+    """Move the plays to any input. Returns whether the limit comes first, where they then stop."""
     if along(m, to) < along(m, m.here.input[0]):
-        turn_back(t, m)
+        reverse(t, m)
     x = along(m, to)
     rising = m.here.rising[0]
-    passed = m.here.depth[0] - 1
-    if passed > 0 and x >= m.corner.passed[passed, rising]:
+    kept = m.here.depth[0] - 1
+    if kept > 0 and x >= m.corner.passed[kept, rising]:
+        passed = kept
         kept = 0
         while passed - kept > 1:
             middle = (kept + passed) // 2
@@ -223,44 +249,7 @@ def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
                 kept = middle
         m.here.k[0] = m.corner.top[passed]
         m.here.depth[0] = passed
-    c = m.here.depth[0] - 1
-    k = m.here.k[0]
-    cap: Scalar = m.corner.passed[c, rising]
-    after = cap
-    begin = cap
-    y = along(m, m.corner.output[c])
-    m.plays.behind[0] = to
-    if m.corner.rose[c] != rising:
-        top = m.corner.top[c]
-        origin = m.corner.passed[c, 1 - rising]
-        room = t.inside[rising] - y
-        k = find_segment(t.way, k, top, x + origin)
-        begin = t.way[k] - origin
-        y = y + t.reach[k]
-        after = t.way[k + 1] - origin
-        cap = after if m.corner.rose[c] == BOTTOM else cap
-        if t.reach[top] > room:
-            cap = begin + (room - t.reach[k]) * t.slope[k]
-        m.plays.from_input[0] = -along(m, origin)
-        m.plays.from_output[0] = m.corner.output[c]
-        if k == 0 and origin <= t.range[1 - rising]:
-            m.plays.behind[0] = m.plays.from_input[0]
-    m.plays.begin[0] = along(m, begin)
-    m.plays.start[0] = along(m, y)
-    m.plays.gain[0] = t.gain[k]
-    output = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
-    if along(m, output) > t.limit[rising]:
-        return False
-    if along(m, output) < along(m, m.here.output[0]):
-        cap = x
-    else:
-        m.here.output[0] = output
-    cap = t.range[rising] if t.range[rising] < cap else cap
-    m.plays.cap[0] = along(m, cap)
-    m.plays.next[0] = along(m, after if after < cap else cap)
-    m.here.k[0] = k
-    m.here.input[0] = to
-    return True
+    return move_or_stop(t, m, kept, x, t.limit[rising], False)
 
 
 @jit
@@ -268,17 +257,18 @@ def move_in_block(t: Curve, m: Memory, to: Scalar) -> bool:
     """Move on to an input short of `cap`, where more plays of the block follow. False if a search would be faster."""
     way = along(m, to - m.plays.from_input[0])
     k = m.here.k[0] + 1
-    many = m.here.k[0] + 8
-    while k < many and way > t.way[k + 1]:
+    while way > t.way[k + 1]:
         k += 1
+        if k == m.here.k[0] + 8:
+            return False
     m.plays.begin[0] = m.plays.from_input[0] + along(m, t.way[k])
     m.plays.start[0] = m.plays.from_output[0] + along(m, t.reach[k])
     m.plays.gain[0] = t.gain[k]
     output = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
-    if k == many or along(m, output - m.here.output[0]) < t.literal.zero[0]:
+    if along(m, output) < along(m, m.here.output[0]):
         return False
     after = m.plays.from_input[0] + along(m, t.way[k + 1])
-    m.plays.next[0] = after if along(m, after - m.plays.cap[0]) < t.literal.zero[0] else m.plays.cap[0]
+    m.plays.next[0] = after if along(m, after) < along(m, m.plays.cap[0]) else m.plays.cap[0]
     m.here.k[0] = k
     m.here.input[0] = to
     m.here.output[0] = output
@@ -320,7 +310,7 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
         m.here.input[0] = s.center[c, 0] + along(m, t.way[k] * t.literal.half[0])
         m.here.output[0] = s.center[c, 1] + along(m, t.reach[k] * t.literal.half[0])
-        leave_corner(t, m)
+        reverse(t, m)
     m.here.k[0] = 0
     m.here.rising[0] = 1
     m.plays.sign[0] = t.literal.one[0]

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 22eb0f9bbcef5246e2f01991bd3defead0fa5d1032a14c8f25f41a9838e39b74, without this line
+ * Text: sha256 ef75754a51f769da87f7c2285cea1a15ea67bf5292e08ca78cf6bcb67da655fe, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -40,6 +40,9 @@
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
 #define PLAIN_SOFT_FLOAT /* each operation is a library call */
+#define PLAIN_SWIFT PLAIN_APART
+#else
+#define PLAIN_SWIFT static inline
 #endif
 
 #if defined(__GNUC__)
@@ -109,25 +112,22 @@ static void plain_take_back(plain_plays_t *m, const plain_place_t *to) {
     plain_forget_line(m);
 }
 
-/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
-PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
-        plain_corner_t *corner) {
+/* Reverses the move and, if plays have followed, leaves a corner. A block whose last play follows
+   only beyond the limit is never passed. */
+PLAIN_SWIFT void plain_reverse(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
     const plain_direction_t on = plain_direction(m->here.rising);
     const plain_direction_t back = plain_direction(!m->here.rising);
-    const plain_real_t room = t->limit[back] + plain_along(m, m->here.output);
-    plain_corner_t *c = &corner[m->here.depth];
-    c->output = m->here.output;
-    c->pass[on] = plain_along(m, m->here.input);
-    c->pass[back] = s->reach > room ? FLT_MAX : s->way - c->pass[on];
-    c->top = m->here.k;
-    c->rose = (uint_least8_t)on;
-    m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-}
-
-static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner) {
     if (m->here.k > 0) {
-        plain_leave_corner(t, m, corner);
+        const plain_real_t x = plain_along(m, m->here.input);
+        plain_corner_t *c = &corner[m->here.depth];
+        c->output = m->here.output;
+        c->pass[on] = x;
+        const plain_real_t room = t->limit[back] + plain_along(m, m->here.output);
+        c->pass[back] = s->reach > room ? FLT_MAX : s->way - x;
+        c->top = m->here.k;
+        c->rose = (uint_least8_t)on;
+        m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         m->here.k = 0;
     }
     m->here.rising = !m->here.rising;
@@ -135,12 +135,18 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
-static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
-        unsigned int end, plain_real_t x, bool by_reach) {
+/* The same as a function of its own: bytes matter more than time. */
+PLAIN_APART void plain_reverse_apart(const plain_curve_t *t, plain_plays_t *m,
+        plain_corner_t *corner) {
+    plain_reverse(t, m, corner);
+}
+
+/* Last of segments k .. end - 1 that begins before a way and, if `both`, a reach; k always does. */
+static inline unsigned int plain_find_segment(const plain_segment_t *s, unsigned int k,
+        unsigned int end, plain_real_t way, plain_real_t reach, bool both) {
     unsigned int middle = (k + end) / 2;
-    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
-        const bool before = x > (by_reach ? segment[middle].reach : segment[middle].way);
+    while (middle > k) { /* bisect: segment k begins before them, segment `end` does not */
+        const bool before = (!both || reach > s[middle].reach) && way > s[middle].way;
         k = before ? middle : k;
         end = before ? end : middle;
         middle = (k + end) / 2;
@@ -148,60 +154,97 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
-PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
-        const plain_corner_t *corner, plain_real_t output, plain_real_t input) {
-    const plain_corner_t *c = &corner[m->here.depth - 1u];
-    plain_real_t reach = plain_along(m, output - c->output);
+/* Moves the plays in the block of c to `input`, or stops them at the sum `output`: in any case if
+   `stop`, else if it is a limit and comes first. Both are along the move. True if they stop. */
+PLAIN_APART bool plain_move_or_stop(const plain_curve_t *t, plain_plays_t *m,
+        const plain_corner_t *c, plain_real_t input, plain_real_t output, bool stop) {
     const plain_direction_t on = plain_direction(m->here.rising);
-    plain_real_t x = c->pass[on];
+    const plain_direction_t other = plain_direction(!m->here.rising);
+    const plain_real_t from = c->pass[other];
+    plain_real_t cap = c->pass[on];
+    plain_real_t next = cap;
+    plain_real_t begin = cap;
+    plain_real_t start = plain_along(m, c->output);
     unsigned int k = m->here.k;
-    if (c->rose != on) {
-        k = plain_find_segment(t->segment, k, c->top, reach, true);
-        reach = reach - t->segment[k].reach;
-        x = t->segment[k].way - c->pass[plain_direction(!m->here.rising)];
+    bool limits = stop;  /* the plays may stop in this block */
+    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
+        limits = limits || t->segment[c->top].reach > t->inside[on] - start;
+        k = limits ? plain_find_segment(t->segment, k, c->top, input + from, output - start, true)
+            : plain_find_segment(t->segment, k, c->top, input + from, 0, false);
+        begin = t->segment[k].way - from;
+        start = start + t->segment[k].reach;
     }
-    x = x + reach * t->segment[k].slope;
-    m->here.input = x < plain_along(m, input) ? plain_along(m, x) : input;
-    m->here.output = output;
+    const plain_segment_t *s = &t->segment[k];
+    m->begin = plain_along(m, begin);
+    m->start = plain_along(m, start);
+    m->gain = s->gain;
     m->here.k = (uint_least16_t)k;
-    plain_forget_line(m);
+    const plain_real_t y = stop ? output : start + (input - begin) * s->gain;
+    if (stop || y > output) {
+        const plain_real_t x = begin + (output - start) * s->slope;
+        m->here.input = plain_along(m, x < input ? x : input);
+        m->here.output = plain_along(m, output);
+        plain_forget_line(m);
+        return true;
+    }
+    m->here.input = plain_along(m, input);
+    m->behind = m->here.input;
+    if (c->rose != on) {
+        next = s[1].way - from;
+        cap = c->rose == PLAIN_BOTTOM ? next : cap; /* all plays below its top follow */
+        if (limits) {
+            cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
+        }
+        m->from_input = -plain_along(m, from);
+        m->from_output = c->output;
+        m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
+    }
+    if (y < plain_along(m, m->here.output)) { /* by rounding */
+        cap = input;
+    } else {
+        m->here.output = plain_along(m, y);
+        cap = t->range[on] < cap ? t->range[on] : cap;
+    }
+    m->cap = plain_along(m, cap);
+    m->next = plain_along(m, next < cap ? next : cap);
+    return false;
 }
 
 /* Moves the plays to the sum `output`, up to rounding. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t output) {
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
-        plain_turn_back(t, m, corner);
+        plain_reverse_apart(t, m, corner);
     }
     const plain_direction_t on = plain_direction(m->here.rising);
-    unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
-    while (m->here.depth - kept > 1u) {
-        const unsigned int middle = (kept + m->here.depth) / 2;
+    unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
+    unsigned int passed = m->here.depth;
+    while (passed - kept > 1u) {
+        const unsigned int middle = (kept + passed) / 2;
         const plain_real_t reach =
             corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
-        const bool passed = plain_along(m, output - corner[middle].output) >= reach;
-        m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
-        m->here.k = passed ? corner[middle].top : m->here.k;
-        kept = passed ? kept : middle;
+        const bool beyond = plain_along(m, output - corner[middle].output) >= reach;
+        passed = beyond ? middle : passed;
+        kept = beyond ? kept : middle;
     }
+    m->here.k = passed < m->here.depth ? corner[passed].top : m->here.k;
+    m->here.depth = (uint_least16_t)passed;
     m->limited = false;
-    plain_stop_in_block(t, m, corner, output, plain_along(m, FLT_MAX));
+    (void)plain_move_or_stop(t, m, &corner[kept], FLT_MAX, plain_along(m, output), true);
 }
 
-/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
+/* Moves the plays to any input. True if the limit comes first, where they then stop. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t input) {
     if (plain_along(m, input) < plain_along(m, m->here.input)) {
-        plain_turn_back(t, m, corner);
+        plain_reverse(t, m, corner);
     }
     const plain_real_t x = plain_along(m, input);
     const plain_direction_t on = plain_direction(m->here.rising);
-    const plain_direction_t other = plain_direction(!m->here.rising);
-    const plain_corner_t *c = &corner[m->here.depth - 1u];
-    if (m->here.depth > 1u && x >= c->pass[on]) {
-        unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
-        unsigned int passed = m->here.depth - 1u;
+    unsigned int kept = m->here.depth - 1u;
+    if (kept > 0 && x >= corner[kept].pass[on]) {
+        unsigned int passed = kept;
+        kept = 0; /* bisect: `passed` is passed, `kept` is not */
         while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[on];
@@ -210,67 +253,32 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;
-        c = &corner[kept];
     }
-    plain_real_t cap = c->pass[on];
-    plain_real_t next = cap;
-    plain_real_t begin = cap;
-    plain_real_t start = plain_along(m, c->output);
-    unsigned int k = m->here.k;
-    m->behind = input;
-    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
-        const plain_real_t from = c->pass[other];
-        const plain_real_t room = t->inside[on] - start;
-        k = plain_find_segment(t->segment, k, c->top, x + from, false);
-        const plain_segment_t *s = &t->segment[k];
-        begin = s->way - from;
-        start = start + s->reach;
-        next = s[1].way - from;
-        cap = c->rose == PLAIN_BOTTOM ? next : cap; /* all plays below its top follow */
-        if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
-            cap = begin + (room - s->reach) * s->slope;
-        }
-        m->from_input = -plain_along(m, from);
-        m->from_output = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from_input : input; /* same line back */
-    }
-    m->begin = plain_along(m, begin);
-    m->start = plain_along(m, start);
-    m->gain = t->segment[k].gain;
-    const plain_real_t output = m->start + (input - m->begin) * m->gain;
-    if (plain_along(m, output) > t->limit[on]) {
-        return false;
-    }
-    const bool back = plain_along(m, output) < plain_along(m, m->here.output); /* by rounding */
-    m->here.output = back ? m->here.output : output;
-    const plain_real_t end = t->range[on] < cap ? t->range[on] : cap;
-    cap = back ? x : end;
-    m->cap = plain_along(m, cap);
-    m->next = plain_along(m, next < cap ? next : cap);
-    m->here.k = (uint_least16_t)k;
-    m->here.input = input;
-    return true;
+    return plain_move_or_stop(t, m, &corner[kept], x, t->limit[on], false);
 }
 
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
-PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
+PLAIN_SWIFT bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
     const plain_real_t way = plain_along(m, input - m->from_input);
-    unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
-    do {
-        ++k;
-    } while (k < many && way > t->segment[k + 1u].way);
-    const plain_segment_t *s = &t->segment[k];
+    const plain_segment_t *s = &t->segment[m->here.k + 1u];
+    unsigned int more = 1; /* plays that begin to follow */
+    while (way > s[1].way) {
+        ++s;
+        ++more;
+        if (more == 8u) { /* from here on, bisection is faster */
+            return false;
+        }
+    }
     m->begin = m->from_input + plain_along(m, s->way);
     m->start = m->from_output + plain_along(m, s->reach);
     m->gain = s->gain;
     const plain_real_t output = m->start + (input - m->begin) * m->gain;
-    if (k == many || plain_along(m, output - m->here.output) < 0) {
+    if (plain_along(m, output) < plain_along(m, m->here.output)) { /* by rounding */
         return false;
     }
     const plain_real_t next = m->from_input + plain_along(m, s[1].way);
-    m->next = plain_along(m, next - m->cap) < 0 ? next : m->cap;
-    m->here.k = (uint_least16_t)k;
+    m->next = plain_along(m, next) < plain_along(m, m->cap) ? next : m->cap;
+    m->here.k = (uint_least16_t)(m->here.k + more);
     m->here.input = input;
     m->here.output = output;
     return true;
@@ -293,7 +301,7 @@ PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_cor
         m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
         m->here.input = center[0] + plain_along(m, t->segment[k].way / 2);
         m->here.output = center[1] + plain_along(m, t->segment[k].reach / 2);
-        plain_leave_corner(t, m, corner);
+        plain_reverse_apart(t, m, corner);
     }
     m->here.k = 0;
     m->here.rising = true;
@@ -326,7 +334,7 @@ static plain_real_t plain_clamp_drive(plain_real_t v) {
 }
 
 /* Any sample that needs a search. */
-PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
+PLAIN_APART void plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
     const plain_curve_t *t = &plain_inverse_curve;
     plain_plays_t *m = &self->plays;
     plain_real_t x = u - PLAIN_OFFSET;
@@ -340,12 +348,9 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
         if (self->stepped && self->committed) {
             plain_move_to_output(t, m, self->corner, self->returned);
         }
-    } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
-        bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
-    } else if ((x < m->here.input || x > m->here.input) &&
-            !plain_move_to_input(t, m, self->corner, x)) {
-        plain_stop_in_block(t, m, self->corner, m->here.rising ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN,
-            x);
+    } else if ((m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) ||
+            ((x < m->here.input || x > m->here.input) &&
+            plain_move_to_input(t, m, self->corner, x))) {
         m->limited = true;
         bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     }
@@ -353,7 +358,6 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     self->stepped = true;
     self->committed = false;
     self->status |= bits;
-    return m->here.output;
 }
 
 /* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
@@ -389,7 +393,8 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
             return m->here.output;
         }
     }
-    return plain_inverse_search(self, u);
+    plain_inverse_search(self, u);
+    return m->here.output;
 }
 
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 2c03963bd593cec87fabd194270978c1a075ca3316fad05cc96bac56c96a1e5d, without this line
+ * Text: sha256 4780c9d682945a21d0e8853cd03ed4eeca18f2faee522f5c180cf3dbcfafdcdf, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -258,6 +258,9 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
 #define TWO_BRANCHES_SOFT_FLOAT /* each operation is a library call */
+#define TWO_BRANCHES_SWIFT TWO_BRANCHES_APART
+#else
+#define TWO_BRANCHES_SWIFT static inline
 #endif
 
 #if defined(__GNUC__)
@@ -502,26 +505,22 @@ static void two_branches_take_back(two_branches_plays_t *m, const two_branches_p
     two_branches_forget_line(m);
 }
 
-/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
-TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
-        two_branches_plays_t *m, two_branches_corner_t *corner) {
+/* Reverses the move and, if plays have followed, leaves a corner. A block whose last play follows
+   only beyond the limit is never passed. */
+TWO_BRANCHES_SWIFT void two_branches_reverse(const two_branches_curve_t *t, two_branches_plays_t *m,
+        two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
     const two_branches_direction_t back = two_branches_direction(!m->here.rising);
-    const two_branches_real_t room = t->limit[back] + two_branches_along(m, m->here.output);
-    two_branches_corner_t *c = &corner[m->here.depth];
-    c->output = m->here.output;
-    c->pass[on] = two_branches_along(m, m->here.input);
-    c->pass[back] = s->reach > room ? FLT_MAX : s->way - c->pass[on];
-    c->top = m->here.k;
-    c->rose = (uint_least8_t)on;
-    m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-}
-
-static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_plays_t *m,
-        two_branches_corner_t *corner) {
     if (m->here.k > 0) {
-        two_branches_leave_corner(t, m, corner);
+        const two_branches_real_t x = two_branches_along(m, m->here.input);
+        two_branches_corner_t *c = &corner[m->here.depth];
+        c->output = m->here.output;
+        c->pass[on] = x;
+        c->pass[back] = s->way - x;
+        c->top = m->here.k;
+        c->rose = (uint_least8_t)on;
+        m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         m->here.k = 0;
     }
     m->here.rising = !m->here.rising;
@@ -529,12 +528,19 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
-static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
-        unsigned int k, unsigned int end, two_branches_real_t x, bool by_reach) {
+/* The same as a function of its own: bytes matter more than time. */
+TWO_BRANCHES_APART void two_branches_reverse_apart(const two_branches_curve_t *t,
+        two_branches_plays_t *m, two_branches_corner_t *corner) {
+    two_branches_reverse(t, m, corner);
+}
+
+/* Last of segments k .. end - 1 that begins before a way and, if `both`, a reach; k always does. */
+static inline unsigned int two_branches_find_segment(const two_branches_segment_t *s,
+        unsigned int k, unsigned int end, two_branches_real_t way, two_branches_real_t reach,
+        bool both) {
     unsigned int middle = (k + end) / 2;
-    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
-        const bool before = x > (by_reach ? segment[middle].reach : segment[middle].way);
+    while (middle > k) { /* bisect: segment k begins before them, segment `end` does not */
+        const bool before = (!both || reach > s[middle].reach) && way > s[middle].way;
         k = before ? middle : k;
         end = before ? end : middle;
         middle = (k + end) / 2;
@@ -542,61 +548,98 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
-TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
-        two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
-        two_branches_real_t input) {
-    const two_branches_corner_t *c = &corner[m->here.depth - 1u];
-    two_branches_real_t reach = two_branches_along(m, output - c->output);
+/* Moves the plays in the block of c to `input`, or stops them at the sum `output`: in any case if
+   `stop`, else if it is a limit and comes first. Both are along the move. True if they stop. */
+TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
+        two_branches_plays_t *m, const two_branches_corner_t *c, two_branches_real_t input,
+        two_branches_real_t output, bool stop) {
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    two_branches_real_t x = c->pass[on];
+    const two_branches_direction_t other = two_branches_direction(!m->here.rising);
+    const two_branches_real_t from = c->pass[other];
+    two_branches_real_t cap = c->pass[on];
+    two_branches_real_t next = cap;
+    two_branches_real_t begin = cap;
+    two_branches_real_t start = two_branches_along(m, c->output);
     unsigned int k = m->here.k;
-    if (c->rose != on) {
-        k = two_branches_find_segment(t->segment, k, c->top, reach, true);
-        reach = reach - t->segment[k].reach;
-        x = t->segment[k].way - c->pass[two_branches_direction(!m->here.rising)];
+    bool limits = stop;  /* the plays may stop in this block */
+    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
+        k = limits
+            ? two_branches_find_segment(t->segment, k, c->top, input + from, output - start, true)
+            : two_branches_find_segment(t->segment, k, c->top, input + from, 0, false);
+        begin = t->segment[k].way - from;
+        start = start + t->segment[k].reach;
     }
-    x = x + reach * t->segment[k].slope;
-    m->here.input = x < two_branches_along(m, input) ? two_branches_along(m, x) : input;
-    m->here.output = output;
+    const two_branches_segment_t *s = &t->segment[k];
+    m->begin = two_branches_along(m, begin);
+    m->start = two_branches_along(m, start);
+    m->gain = s->gain;
     m->here.k = (uint_least16_t)k;
-    two_branches_forget_line(m);
+    const two_branches_real_t y = stop ? output : start + (input - begin) * s->gain;
+    if (stop) {
+        const two_branches_real_t x = begin + (output - start) * s->slope;
+        m->here.input = two_branches_along(m, x < input ? x : input);
+        m->here.output = two_branches_along(m, output);
+        two_branches_forget_line(m);
+        return true;
+    }
+    m->here.input = two_branches_along(m, input);
+    m->behind = m->here.input;
+    if (c->rose != on) {
+        next = s[1].way - from;
+        cap = c->rose == TWO_BRANCHES_BOTTOM ? next : cap; /* all plays below its top follow */
+        if (limits) {
+            cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
+        }
+        m->from_input = -two_branches_along(m, from);
+        m->from_output = c->output;
+        m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
+    }
+    if (y < two_branches_along(m, m->here.output)) { /* by rounding */
+        cap = input;
+    } else {
+        m->here.output = two_branches_along(m, y);
+    }
+    m->cap = two_branches_along(m, cap);
+    m->next = two_branches_along(m, next < cap ? next : cap);
+    return false;
 }
 
 /* Moves the plays to the sum `output`, up to rounding. */
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t output) {
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
-        two_branches_turn_back(t, m, corner);
+        two_branches_reverse_apart(t, m, corner);
     }
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
-    while (m->here.depth - kept > 1u) {
-        const unsigned int middle = (kept + m->here.depth) / 2;
+    unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
+    unsigned int passed = m->here.depth;
+    while (passed - kept > 1u) {
+        const unsigned int middle = (kept + passed) / 2;
         const two_branches_real_t reach =
             corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
-        const bool passed = two_branches_along(m, output - corner[middle].output) >= reach;
-        m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
-        m->here.k = passed ? corner[middle].top : m->here.k;
-        kept = passed ? kept : middle;
+        const bool beyond = two_branches_along(m, output - corner[middle].output) >= reach;
+        passed = beyond ? middle : passed;
+        kept = beyond ? kept : middle;
     }
+    m->here.k = passed < m->here.depth ? corner[passed].top : m->here.k;
+    m->here.depth = (uint_least16_t)passed;
     m->limited = false;
-    two_branches_stop_in_block(t, m, corner, output, two_branches_along(m, FLT_MAX));
+    (void)two_branches_move_or_stop(t, m, &corner[kept], FLT_MAX, two_branches_along(m, output),
+        true);
 }
 
-/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
+/* Moves the plays to any input. True if the limit comes first, where they then stop. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
-        two_branches_turn_back(t, m, corner);
+        two_branches_reverse(t, m, corner);
     }
     const two_branches_real_t x = two_branches_along(m, input);
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    const two_branches_direction_t other = two_branches_direction(!m->here.rising);
-    const two_branches_corner_t *c = &corner[m->here.depth - 1u];
-    if (m->here.depth > 1u && x >= c->pass[on]) {
-        unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
-        unsigned int passed = m->here.depth - 1u;
+    unsigned int kept = m->here.depth - 1u;
+    if (kept > 0 && x >= corner[kept].pass[on]) {
+        unsigned int passed = kept;
+        kept = 0; /* bisect: `passed` is passed, `kept` is not */
         while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[on];
@@ -605,69 +648,33 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;
-        c = &corner[kept];
     }
-    two_branches_real_t cap = c->pass[on];
-    two_branches_real_t next = cap;
-    two_branches_real_t begin = cap;
-    two_branches_real_t start = two_branches_along(m, c->output);
-    unsigned int k = m->here.k;
-    m->behind = input;
-    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
-        const two_branches_real_t from = c->pass[other];
-        const two_branches_real_t room = t->inside[on] - start;
-        k = two_branches_find_segment(t->segment, k, c->top, x + from, false);
-        const two_branches_segment_t *s = &t->segment[k];
-        begin = s->way - from;
-        start = start + s->reach;
-        next = s[1].way - from;
-        cap = c->rose == TWO_BRANCHES_BOTTOM ? next : cap; /* all plays below its top follow */
-        if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
-            cap = begin + (room - s->reach) * s->slope;
-        }
-        m->from_input = -two_branches_along(m, from);
-        m->from_output = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from_input : input; /* same line back */
-    }
-    m->begin = two_branches_along(m, begin);
-    m->start = two_branches_along(m, start);
-    m->gain = t->segment[k].gain;
-    const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
-    if (two_branches_along(m, output) > t->limit[on]) {
-        return false;
-    }
-    /* by rounding */
-    const bool back = two_branches_along(m, output) < two_branches_along(m, m->here.output);
-    m->here.output = back ? m->here.output : output;
-    const two_branches_real_t end = t->range[on] < cap ? t->range[on] : cap;
-    cap = back ? x : end;
-    m->cap = two_branches_along(m, cap);
-    m->next = two_branches_along(m, next < cap ? next : cap);
-    m->here.k = (uint_least16_t)k;
-    m->here.input = input;
-    return true;
+    return two_branches_move_or_stop(t, m, &corner[kept], x, t->limit[on], false);
 }
 
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
-TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
+TWO_BRANCHES_SWIFT bool two_branches_move_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from_input);
-    unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
-    do {
-        ++k;
-    } while (k < many && way > t->segment[k + 1u].way);
-    const two_branches_segment_t *s = &t->segment[k];
+    const two_branches_segment_t *s = &t->segment[m->here.k + 1u];
+    unsigned int more = 1; /* plays that begin to follow */
+    while (way > s[1].way) {
+        ++s;
+        ++more;
+        if (more == 8u) { /* from here on, bisection is faster */
+            return false;
+        }
+    }
     m->begin = m->from_input + two_branches_along(m, s->way);
     m->start = m->from_output + two_branches_along(m, s->reach);
     m->gain = s->gain;
     const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
-    if (k == many || two_branches_along(m, output - m->here.output) < 0) {
+    if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) { /* by rounding */
         return false;
     }
     const two_branches_real_t next = m->from_input + two_branches_along(m, s[1].way);
-    m->next = two_branches_along(m, next - m->cap) < 0 ? next : m->cap;
-    m->here.k = (uint_least16_t)k;
+    m->next = two_branches_along(m, next) < two_branches_along(m, m->cap) ? next : m->cap;
+    m->here.k = (uint_least16_t)(m->here.k + more);
     m->here.input = input;
     m->here.output = output;
     return true;
@@ -683,9 +690,9 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
     } else if (on
-            ? two_branches_along(m, input - m->cap) >= 0 ||
+            ? two_branches_along(m, input) >= two_branches_along(m, m->cap) ||
                 !two_branches_move_in_block(t, m, input)
-            : two_branches_along(m, input - m->here.input) < 0) {
+            : two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
         (void)two_branches_move_to_input(t, m, corner, input);
     }
     return m->here.output;
@@ -708,7 +715,7 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
         m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
         m->here.input = center[0] + two_branches_along(m, t->segment[k].way / 2);
         m->here.output = center[1] + two_branches_along(m, t->segment[k].reach / 2);
-        two_branches_leave_corner(t, m, corner);
+        two_branches_reverse_apart(t, m, corner);
     }
     m->here.k = 0;
     m->here.rising = true;
