@@ -16,6 +16,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.jit import plain
 from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
 from hystgen.chain.chain import Chain, arriving_slack
 from hystgen.compensator.chain import noise, preview
@@ -224,6 +225,7 @@ class Compensator:
         """Drives (N,) within `ends` for the reference in `reference.v`; see `answers`."""
         return self.answers(reference, ends, asked)[0]
 
+    @plain()  # a sample's few blocks take less time than handing their tables to compiled code
     def answers(
         self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None,
         held: NDArray[np.bool_] | None = None,

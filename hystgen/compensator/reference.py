@@ -124,8 +124,9 @@ def answers(
     code, state = operations(t, inverse), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
-    with jit.for_samples(code.run, x) if compiled else jit.plain():
+    with jit.plain():  # one pass over the memory is not worth compiling
         code.init(t, state)
+    with jit.for_samples(code.run, x) if compiled else jit.plain():
         code.run(t, state, np.asarray(call, dtype=np.uint8), x, found, status)
     return found, status
 
@@ -168,7 +169,7 @@ class Session:
 
     def init(self) -> None:
         """Return to the start memory."""
-        with jit.plain():  # a single pass over the plays is not worth compiling
+        with jit.plain():  # as in `answers`
             self._code.init(self.tables, self.state)
 
     @property
