@@ -1,15 +1,15 @@
 """Runs behind chosen numbers that no test of a model can set: what another value would cost or spoil.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples]
+        [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples] [tries]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.gains.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
 `compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`; noisy: `model.MOST_GAIN` and
-`emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`. Each takes some
-seconds, shifts a minute; random numbers have fixed seeds.
+`emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`; tries:
+`effects.plays.NEWTON_TRIES`. Each takes some seconds, shifts a minute; random numbers have fixed seeds.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ from numpy.typing import NDArray
 
 import hystgen
 from hystgen import plants
+from hystgen.basics import jit
 from hystgen.chain import chain
 from hystgen.compensator import reference
-from hystgen.compensator.chain import layout, measured, moving, noise, preview, tables
+from hystgen.compensator.chain import layout, measured, moving, moving_float, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.compensator.chain.run import answers as reference_answers
 from hystgen.compensator.chained import STANDARD
@@ -387,6 +388,65 @@ def samples() -> None:
             print(" ", *(f"{each / found[-1]:6.2f}" for each in found), f" {arithmetic}, {effect}")
 
 
+PLAYS = """\
+hystgen: 1
+name: stage_x
+sample_time: 1.0e-3
+input_range: [-10, 10]
+model:
+  pi: {{thresholds: [0, 1, 1.5, 2.5, 4, 5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}}
+  effects:
+    - {{{effect}}}
+"""
+
+
+def tries() -> None:
+    """Inputs that a search in float32 tries: on average and at most, with up to so many by Newton's method."""
+    moved, steep = moving_float.MOVES.floating.tried, moving_float.BENDS.floating.steep
+    values = (2, 4, 6, 8, 12)
+    print("tries:", *(f"{value:8}" for value in values))
+    for effect in (
+        "rate_dependence, betas: [3.0e-4, 0, 1.0e-4, 4.0e-4, 2.0e-4]",
+        "rate_dependence, betas: [0.01, 0, 0.002, 0, 0.1]",
+        *(f"rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: {m}" for m in (0.6, 2, 4)),
+        "noncongruent, coefficients: [[0.1, -0.02], [0.05], [-0.1], [0.02, 0.01, 0.005], [0.03]]",
+        *(f"noncongruent, shape: centre, amplitude: {a}, centre: 1, width: 1" for a in (1.5, -0.8)),
+    ):
+        model = hystgen.Model(parse_parameters(PLAYS.format(effect=f"name: {effect}"), "stage_x.yaml"))
+        t: Any = model.tables("float32", "loop")
+        tried: list[int] = []
+
+        def sum_at(t: Any, s: Any, w: Any, tried: list[int] = tried) -> tuple[Any, Any, Any]:
+            tried[-1] += 1
+            p, m = t.plays.weight, t.moving
+            total, slope, steady = p[0] * w, p[0], p[0]
+            for i in range(1, len(p)):
+                moves, z, share = moved(m, t.plays.threshold, i, s.plays, s.lost, True, w)
+                value, change = steep(m, t.plays, i, z) if moves else (s.bent[i], p[i] - p[i])
+                total = total + p[i] * value
+                steady = steady + p[i] * change
+                slope = slope + p[i] * change * share
+            return total, slope, steady
+
+        rng, k = np.random.default_rng(2), np.arange(300)
+        walk = np.clip(np.cumsum(rng.normal(0.0, 0.1, 300)), -1.0, 1.0)
+        low, high = t.limits.output[0]
+        for name, levels in (("sine", np.sin(0.05 * k)), ("walk", walk), ("jumps", rng.uniform(-1.0, 1.0, 300))):
+            found = []
+            for value in values:
+                with mock.patch.object(moving_float.at, "NEWTON_TRIES", value), jit.plain():
+                    search, s = moving_float.search(None, sum_at), reference.new_state(t, True)
+                    reference.operations(t, True).init(t, s)
+                    s.own.moving[0] = 1
+                    tried.clear()
+                    for h in np.float32(levels):
+                        tried.append(0)
+                        w = search(t, s, np.float32(low + (0.5 + 0.5 * h) * (high - low)))
+                        s.plays.step.level[0] = moving_float.PLAYS[1](t, s, w)
+                found.append(f"{np.mean(tried):5.2f} {max(tried):2}")
+            print("      ", *found, f" {name}, {effect.partition(', ')[2]}")
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms deviation of a frequency response from 1, in %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
@@ -396,7 +456,7 @@ RUNS: dict[str, Callable[[], None]] = {
     each.__name__: each
     for each in (
         lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches, noisy, fast,
-        samples,
+        samples, tries,
     )
 }
 

@@ -16,7 +16,18 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.chain import moving, moving_fixed, moving_float
-from hystgen.effects.plays import CLOSE, LARGEST_INPUT, LEAST_INPUT, NEWTON_TRIES, SECANTS
+from hystgen.effects.plays import (
+    DASHPOT,
+    DILATED,
+    INVERSE_SCALE,
+    LARGEST_INPUT,
+    LEAST_INPUT,
+    NEWTON_TRIES,
+    POLYNOMIAL,
+    SCALE,
+    SECANTS,
+    SEEN,
+)
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
@@ -110,41 +121,67 @@ def test_quotients_are_exact_to_a_part_in_2_28() -> None:
     assert fixed.quotient.py_func(0, 5) == 0
 
 
-# ---------------------------------------------------------------- thresholds by rate, in floating point
+# ---------------------------------------------------------------- plays by rate or bent, in floating point
 
-BETAS = (3.0e-4, 0.0, 1.0e-4, 4.0e-4, 2.0e-4)
-"""Unsorted, so that plays do not start to move in order either."""
+PI = "\n  pi: {thresholds: [0, 1, 1.5, 2.5, 4, 5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
+KINDS = {
+    # betas in no order, so that plays start in no order either
+    "dilated": "name: rate_dependence, betas: [3.0e-4, 0, 1.0e-4, 4.0e-4, 2.0e-4]",
+    "dashpot": "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: 2",
+    "soft dashpot": "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: 0.6",
+    "polynomials": "name: noncongruent, coefficients: [[0.1, -0.02], [0.05], [-0.1], [0.02, 0.01, 0.005], [0.03]]",
+}
 
 
-def dilated() -> Model:
-    pi = "\n  pi: {thresholds: [0, 1, 1.5, 2.5, 4, 5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
-    effect = f"  effects: [{{name: rate_dependence, betas: [{', '.join(map(str, BETAS))}]}}]\n"
-    return Model(parse_parameters(f"{head('m')}{pi}{effect}sample_time: 1.0e-3\n", "m.yaml"))
+def of_kind(kind: str) -> Model:
+    effect = f"  effects: [{{{KINDS[kind]}}}]\n"
+    return Model(parse_parameters(f"{head('m')}{PI}{effect}sample_time: 1.0e-3\n", "m.yaml"))
 
 
 class Exact:
-    """Plays whose thresholds grow with the move, in fractions, with the state and constants of a compensator."""
+    """The compensator's plays, each computed in fractions from its state and constants."""
 
     def __init__(self, t: Any, s: Any) -> None:
-        self.r, self.p, self.wider, self.play = (
+        self.r, self.p, self.first, self.play, self.lost = (
             [Fraction(float(x)) for x in row]
-            for row in (t.plays.threshold, t.plays.weight, t.moving.first, s.plays.play)
+            for row in (t.plays.threshold, t.plays.weight, t.moving.first, s.plays.play, s.lost)
         )
+        self.yields, self.curve = ([list(map(Fraction, row)) for row in rows.astype(float).tolist()]
+                                   for rows in (t.moving.yields, t.moving.curve))  # fmt: skip
+        self.number = list(map(Fraction, t.moving.number.astype(float).tolist()))
+        self.moves, self.bends = t.moving.moves, t.moving.bends
+
+    def reached(self, i: int, w: Fraction) -> Fraction:
+        x, q, r = self.play[0], self.play[i], self.r[i]
+        if self.moves == DASHPOT:
+            ahead = x + self.number[SEEN] * (w - x) - q
+            if abs(ahead) <= r:
+                return q
+            begin, *c = [row for row in self.yields if row[0] <= abs(ahead) - r][-1]
+            gained = sum(each * (abs(ahead) - r - begin) ** k for k, each in enumerate(c))
+            return q + self.lost[i] + (gained if ahead > 0 else -gained)
+        wide = r + self.first[i] * abs(w - x) if self.moves == DILATED else r
+        return max(w - wide, min(q, w + wide))
+
+    def bent(self, i: int, z: Fraction) -> Fraction:
+        if self.bends != POLYNOMIAL:
+            return z
+        xi = z * self.number[INVERSE_SCALE]
+        return z + self.number[SCALE] * sum(c * xi ** (k + 2) for k, c in enumerate(self.curve[i]))
 
     def total(self, w: Fraction) -> Fraction:
-        found = self.p[0] * w
-        for r, p, wider, q in list(zip(self.r, self.p, self.wider, self.play, strict=True))[1:]:
-            wide = r + wider * abs(w - self.play[0])
-            found += p * max(w - wide, min(q, w + wide))
-        return found
+        plays = range(1, len(self.r))
+        return self.p[0] * w + sum(self.p[i] * self.bent(i, self.reached(i, w)) for i in plays)
 
     def kinks(self) -> list[Fraction]:
         """Inputs at which a play starts or stops moving with the input, in either direction."""
         x, found = self.play[0], [self.play[0]]
-        for r, wider, q in list(zip(self.r, self.wider, self.play, strict=True))[1:]:
+        seen = self.number[SEEN] if self.moves == DASHPOT else 1
+        for r, first, q in list(zip(self.r, self.first, self.play, strict=True))[1:]:
+            wider = first if self.moves == DILATED else 0
             for side in (1, -1):  # which end of the play's band is at q
                 for way in (1, -1):  # direction of the input
-                    slope = way - side * wider  # of that end, per unit of the move
+                    slope = seen * way - side * wider  # of that end, per unit of the move
                     move = (q - x + side * r) / slope if slope else Fraction(-1)
                     if move > 0:
                         found.append(x + way * move)
@@ -160,43 +197,49 @@ class Exact:
 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
-def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
-    arithmetic: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("kind", KINDS)
+def test_plays_are_solved_for_right_up_to_their_kinks(
+    kind: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The sums are those reached where a play starts, and one unit in the last place to either side, from wherever
-    drives have left the plays. Newton's method finds the input without bisection."""
-    counts = [0]
+    """Sums that are reached where a play starts, and one unit in the last place to either side, from wherever drives
+    have left the plays. Newton's method gets there without halving."""
+    counts, most = [0], 0
     reciprocal = moving_float.inverse.py_func
 
     def counted(t: Any, slope: Any) -> Any:
-        counts[-1] += 1
+        counts[0] += 1
         return reciprocal(t, slope)
 
     monkeypatch.setattr(moving_float, "inverse", counted)
     monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))
-    real, one = ARITHMETICS[arithmetic].number.type, dilated()
+    real, one = ARITHMETICS[arithmetic].number.type, of_kind(kind)
     t = one.tables(arithmetic, "loop")
     code, s = reference.operations(t, True), reference.new_state(t, True)
     number, rng = t.moving.number, np.random.default_rng(5)
     ends = Fraction(float(number[LEAST_INPUT])), Fraction(float(number[LARGEST_INPUT]))
     unit = float(np.finfo(real).eps) / 2
-    least = moving.slopes(one.cascade, one.parameters.model.effects, 1.0e-3)[0]
-    rounding = moving.sum_rounding(one.cascade, one.parameters.model.effects, unit)
+    effects = one.parameters.model.effects
+    least = moving.slopes(one.cascade, effects, 1.0e-3)[0]
+    rounding = moving.sum_rounding(one.cascade, effects, unit)
     with jit.plain():
         code.init(t, s)
         call, status = np.array([slots.OP_STEP], np.uint8), np.zeros(1, np.uint8)
-        for k in range(40):
+        for k in range(12):
             u = np.array([rng.uniform(-8.0, 8.0) * rng.choice([1.0, 0.1])], real)
             code.run(t, s, call, u, np.zeros(1, real), status)
             if k < 2:
                 continue  # plays are at rest, or about to be moved for the first time
             exact = Exact(t, s)
-            for kink in exact.kinks():
+            for kink in (each for each in exact.kinks() if ends[0] < each < ends[1]):
                 at = real(float(exact.total(kink)))
                 for h in (np.nextafter(at, real(-np.inf)), at, np.nextafter(at, real(np.inf))):
-                    counts.append(1)
-                    answer = moving_float.PLAYS[3](t, s, h)
-                    error = abs(Fraction(float(answer)) - exact.solved(Fraction(float(h)), ends))
-                    assert error <= Fraction((rounding + float(number[CLOSE])) / least)
-                    assert error <= Fraction(16 * unit * 12), (k, float(error))
-    assert max(counts[1:]) <= NEWTON_TRIES
+                    counts[0] = 0
+                    answer = Fraction(float(moving_float.PLAYS[3](t, s, h)))
+                    most = max(most, counts[0])
+                    left = abs(exact.total(answer) - Fraction(float(h)))
+                    assert left <= Fraction(rounding + moving.residual(one.cascade, effects, unit))
+                    if kind == "dilated":
+                        error = abs(answer - exact.solved(Fraction(float(h)), ends))
+                        assert error <= left / Fraction(least)
+                        assert error <= Fraction(16 * unit * 12), (k, float(error))
+    assert most <= NEWTON_TRIES

@@ -25,14 +25,15 @@ STRAIGHT, POLYNOMIAL, CENTRE = range(3)
 """How plays move, and how they are bent."""
 
 (
-    SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, INVERSE_BUMP, TANH_CENTRE,
-    LEAST_INPUT, LARGEST_INPUT, HALF, RATE, CLOSE, SEEN,
-) = range(13)
+    SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, AMPLITUDE, STEEPEST, TANH_CENTRE,
+    LEAST_INPUT, LARGEST_INPUT, HALF, ONE, RATE, CLOSE, SEEN,
+) = range(15)
 """Places in `MovingTables.number`."""
 
 NEWTON_TRIES = 8
-"""Tries of a search in floating point by Newton's method, before it halves what is left of its interval: 2 to 3 are
-enough on smooth references, and 5 after jumps."""
+"""Tries of a search in floating point by Newton's method, before it halves what is left of its interval: 1 or 2 are
+enough on smooth references, and 6 after jumps, where 4 are too few and cost 20 tries (benchmarks/chosen_numbers.py
+tries)."""
 
 
 SECANTS = 10
@@ -101,13 +102,15 @@ class FixedMovingTables(NamedTuple):
 
 class Moved(NamedTuple):
     """How plays move at one step length: their kind; `first`, `second` (n,) of plays with a threshold, `yields` and
-    `seen` as in `MovingTables`."""
+    `seen` as in `MovingTables`; how the change of a nonlinear dashpot's play per change of the input varies: most at
+    once, and most per change of the input."""
 
     moves: int
     first: Array
     second: Array
     yields: Array
     seen: float
+    varies: tuple[float, float] = 0.0, 0.0
 
 
 Response = tuple[float, NDArray[np.complex128], float]
@@ -124,7 +127,8 @@ class Mover(Protocol):
     at rest, response (N,) at the factors `z` of a delay by one sample, and the part of it that comes at once;
     `whole_yields`: the yields in fixed point, for stretches up to `end` steps, with knots at `begins` among others;
     `stretch_error`: largest difference between stretches by the yields and by their law, for moves of the input within
-    `ways` in a step and overall, and rounding errors `held` (K,).
+    `ways` in a step and overall, and rounding errors `held` (K,); `disorder`: by how much plays leave the order of
+    their thresholds by the yields, with stretches up to `top`.
     """
 
     def after(self, plays: Array, x: float, w: float, seconds: float) -> Array: ...
@@ -139,6 +143,7 @@ class Mover(Protocol):
         self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
     ) -> list[tuple[int, ...]]: ...
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float: ...
+    def disorder(self, rows: Array, top: float) -> float: ...
 
 
 class Bent(NamedTuple):
@@ -155,9 +160,10 @@ class Moves(NamedTuple):
     """The functions of moving plays in one arithmetic, of the tables m, thresholds r, the index i of a play, the memory
     s of all plays, their rounding remainders and their input w.
 
-    `moved`: play i after its input has gone to w; `tried`: that, and its change per change of w, times a weight, in
-    floating point; `move`: it moves there; `put`: it is put to rest at a place; `rest`:
-    where it would come to rest with its input held. `follow`: all plays with one time constant follow their input,
+    `moved`: play i after its input has gone to w; `move`: it moves there, and whether it does; `put`: it is put to rest
+    at a place; `rest`: where it would come to rest with its input held; `tried`, in floating point: whether it moves
+    when its input goes to w or, before the first drive, comes to rest there, the value it reaches, and its share of a
+    further change of w. `follow`: all plays with one time constant follow their input,
     which gives their sum; `input`: that at which their sum is h.
     """
 
@@ -167,15 +173,15 @@ class Moves(NamedTuple):
     rest: Function  # of m, r, i, s
     follow: Function  # of m, plays, s, w
     input: Function  # of m, plays, s, h
-    tried: Any = None  # of m, r, i, s, lost, w and the weight
+    tried: Any = None  # of m, r, i, s, lost, whether a drive has been applied, and w
 
 
 class Bending(NamedTuple):
-    """The functions of bent plays in one arithmetic: the contribution of play i at z; and in floating point its change
-    per change of w, from that of the play itself."""
+    """The functions of bent plays in one arithmetic: the contribution of play i at z; and in floating point that, and
+    its change per change of z."""
 
     bent: Function  # of m, plays, i, z
-    steep: Any = None  # of m, i, z, the contribution there and the change of the play
+    steep: Any = None  # of the same
 
 
 @dataclass(frozen=True)

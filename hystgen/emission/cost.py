@@ -306,21 +306,20 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     moved, kept = {
         plays.DILATED: ((factor, 3 + more), (0, 0)),
         plays.RELAXING: ((factor, 2 + more), (factor, 2 + more)),
-        plays.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
+        plays.DASHPOT: ((4 + factor, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
-    bent, looked, tanh, steep = _bent(m)
+    bent, looked, tanh = _bent(m)
     twice = 1 + (m.moves == plays.RELAXING)  # a play's contribution, and where it will rest
     tries, beside = _tries(m) if inverse else (0, (0, 0))
-    if isinstance(m, plays.MovingTables):
-        sloped = {plays.DILATED: (1, 1), plays.RELAXING: (1, 1), plays.DASHPOT: (4, yields + 2)}.get(m.moves, (0, 1))
-        steep, compared = steep + sloped[0], sloped[1]
-    else:
-        compared = 0
+    tried = 1 + moved[0] + bent, 1 + moved[1] + looked
+    if isinstance(m, plays.MovingTables):  # with the slope
+        sought = {plays.DILATED: (2, 4), plays.RELAXING: (1, 3), plays.DASHPOT: (6, yields)}.get(m.moves, (0, 2))
+        tried = 3 + sought[0] + bent, sought[1]
     return (
         tries + 1 + beside[0],
-        tries * (1 + moved[0] + bent + steep) + 1 + moved[0] + kept[0] + twice * bent,
+        tries * tried[0] + 1 + moved[0] + kept[0] + twice * bent,
         beside[1] + 15 + 6 * inverse,
-        tries * (1 + moved[1] + looked + compared) + 2 + moved[1] + kept[1] + twice * looked,
+        tries * tried[1] + 2 + moved[1] + kept[1] + twice * looked,
         tanh * (tries + twice),
     )
 
@@ -337,17 +336,17 @@ def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
         tries = 1 + plays.SECANTS + (2 * m.farthest + 1).bit_length()
         return tries, (2 * QUOTIENT[0] * plays.SECANTS, 2 * QUOTIENT[1] * plays.SECANTS + 11 * tries)
     tries = plays.NEWTON_TRIES + m.halves
-    return tries, (2 * (m.turns + 1) * plays.NEWTON_TRIES + tries, 5 * tries)
+    return tries, ((2 * m.turns + 1) * (plays.NEWTON_TRIES + 2) + tries, 5 * tries)
 
 
-def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int]:
-    """Multiplications, comparisons and tanh of a bend per play, and multiplications of its slope."""
+def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int]:
+    """Multiplications, comparisons and tanh of a bend per play, in floating point with its slope."""
     from hystgen.effects import plays
 
     if m.bends == plays.STRAIGHT:
-        return 0, 0, 0, 0
+        return 0, 0, 0
     if isinstance(m, plays.FixedMovingTables):
-        return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0, 0
+        return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0
     if m.bends == plays.CENTRE:
-        return 2, 0, 1, 5
-    return m.curve.shape[1] + 3, 0, 0, 2 * m.curve.shape[1] + 3
+        return 4, 0, 1
+    return 2 * m.curve.shape[1] + 4, 0, 0

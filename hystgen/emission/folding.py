@@ -80,7 +80,7 @@ def parsed(text: str) -> Function | None:
         return None
     parameters = " ".join(found["parameters"].split())
     body = text[len(above) + found.end() : text.rindex("}")]
-    return Function(above, found["before"], found["name"], tuple(parameters.split(", ")), body)
+    return Function(above, re.sub(r"\s+", " ", found["before"]), found["name"], tuple(parameters.split(", ")), body)
 
 
 def folded(

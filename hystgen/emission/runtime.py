@@ -79,9 +79,10 @@ class Family(ABC):
 
     `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: of file names
     that have none in floating point; `helpers`: with functions that several effects call; `curves`: with a memoryless
-    part whose stages are not called one by one; `codes`: with codes; `moves_apart`: whether moving and bending plays
-    takes less stack in separate functions; `opening`: headers before all code of a file; in a single header they stand
-    between `opening_apart` and `closing`, so that they do not affect the code that includes it.
+    part whose stages are not called one by one; `codes`: with codes; `moves_apart`: moves of plays for which moving and
+    bending takes less stack in separate functions; `ordered`: moves of which a sum takes plays behind the first one
+    that stays to stay as well; `opening`: headers before all code of a file; in a single header they stand between
+    `opening_apart` and `closing`, so that they do not affect the code that includes it.
     """
 
     arithmetic: Arithmetic
@@ -91,7 +92,8 @@ class Family(ABC):
     kind: ClassVar[str]
     form: ClassVar[str]
     ending: ClassVar[str]
-    moves_apart: ClassVar[bool]
+    moves_apart: ClassVar[tuple[str, ...]]
+    ordered: ClassVar[tuple[str, ...]] = ()
     curves: ClassVar[tuple[str, ...]]
     codes: ClassVar[tuple[str, ...]]
     helpers: ClassVar[tuple[str, ...]] = HELPERS
@@ -192,7 +194,8 @@ def _apart(holds: bool, otherwise: str = "static ") -> str:
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
-    kind, form, ending, moves_apart = "float", "floating", "", False
+    kind, form, ending = "float", "floating", ""
+    moves_apart, ordered = ("relaxing", "dilated", "dashpot"), ("play", "dashpot")
     curves, codes = (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
@@ -224,7 +227,7 @@ class FloatFamily(Family):
 class FixedFamily(Family):
     """Fixed point."""
 
-    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", True
+    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", ("relaxing", "dilated")
     helpers = (*HELPERS, "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
@@ -305,7 +308,8 @@ class Variant:
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
-            "MOVES_APART": self.family.moves_apart and bent and self.moves in ("relaxing", "dilated"),
+            "MOVES_APART": bent and self.moves in self.family.moves_apart,
+            "ORDERED_PLAYS": self.moves in self.family.ordered,
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 

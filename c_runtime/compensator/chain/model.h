@@ -75,7 +75,8 @@ extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_LARGEST_INPUT 8.0f
 #define HYSTGEN_CENTRE 0.5f
 #define HYSTGEN_INVERSE_WIDTH 2.0f
-#define HYSTGEN_INVERSE_BUMP 4.0f
+#define HYSTGEN_AMPLITUDE 0.3f
+#define HYSTGEN_STEEPEST 1.3f
 #define HYSTGEN_TANH_CENTRE 0.2f
 #define HYSTGEN_TERMS 2u
 #define HYSTGEN_SCALE 4.0f
@@ -128,7 +129,7 @@ typedef struct {
     unsigned int status;
 #ifndef HYSTGEN_HAS_CORNERS
     hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
-    hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+    hystgen_sum_t bent[HYSTGEN_N_PLAYS];
     hystgen_search_t search;
 #else
     bool sought;

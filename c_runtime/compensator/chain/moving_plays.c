@@ -8,19 +8,17 @@
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
 
+/* Play i after the input of the plays has moved from x to w. Not inlined where that needs less
+   stack. */
 #ifdef HYSTGEN_HAS_MOVES_APART
-/* Play i after the input of the plays has moved from x to w. Not inlined, to need less stack. */
-HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t x, hystgen_play_t w) {
-    return hystgen_moved(i, play, x, w);
-}
+HYSTGEN_APART
 #else
-/* Play i after the input of the plays has moved from x to w. */
-static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t x, hystgen_play_t w) {
+static inline
+#endif
+hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play, hystgen_play_t x,
+                               hystgen_play_t w) {
     return hystgen_moved(i, play, x, w);
 }
-#endif
 
 /* Play i at rest with its input at w. */
 static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
@@ -29,17 +27,12 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 }
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
-/* Play i moves while the input of the plays moves from x to w. */
-#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
-HYSTGEN_APART void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
-                                hystgen_play_t w) {
+/* Play i moves while the input of the plays moves from x to w. Returns whether it does. */
+static bool hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
+    const hystgen_play_t before = play[i];
     play[i] = hystgen_reached(i, play, x, w);
+    return play[i] < before || play[i] > before;
 }
-#else
-static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
-    play[i] = hystgen_reached(i, play, x, w);
-}
-#endif
 
 /* Play i rests at z. */
 static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
@@ -47,57 +40,47 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 }
 #endif
 
+/* Contribution of play i where it is. */
+static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t *play,
+                                         const hystgen_sum_t *bent) {
 #ifdef HYSTGEN_HAS_BENT_PLAYS
-/* Contribution of play i at z; `bent` holds the contribution at the play's rest value. */
-static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
-                                         const hystgen_sum_t *bent, hystgen_play_t z) {
-    return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
-}
-
-/* Play i has moved from z. Updates its contribution. Returns it. */
-static hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play, hystgen_sum_t *bent,
-                                    hystgen_play_t z) {
-    if (play[i] < z || play[i] > z) {
-        return hystgen_bent_anew(i, play[i], bent);
-    }
-    return bent[i];
-}
-#else
-/* Contribution of play i at z: z itself. */
-static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
-                                                const hystgen_sum_t *bent, hystgen_play_t z) {
-    (void)i;
     (void)play;
+    return bent[i - 1u];
+#else
     (void)bent;
-    return z;
+    return play[i];
+#endif
 }
 
-/* Contribution of play i: where it is. */
-static inline hystgen_sum_t hystgen_rebent(unsigned int i, const hystgen_play_t *play,
-                                           hystgen_sum_t *bent, hystgen_play_t z) {
-    (void)bent;
-    (void)z;
-    return play[i];
+/* A sum of plays, with those from play i on where they are. */
+HYSTGEN_APART hystgen_sum_t hystgen_with_staying(unsigned int i, const hystgen_play_t *play,
+                                              const hystgen_sum_t *bent, hystgen_sum_t sum) {
+    HYSTGEN_ROLLED
+    for (; i <= HYSTGEN_N_PLAYS; ++i) {
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);
+    }
+    return sum;
 }
-#endif
 
 /* The plays move while their input moves to w. Returns their sum. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-#ifdef HYSTGEN_HAS_BENT_PLAYS
-    const hystgen_play_t *from = play; /* read for each play: saved across calls, it takes stack */
-#else
-    const hystgen_play_t x = play[0];
-    const hystgen_play_t *from = &x;
-#endif
     unsigned int i;
     HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t before = play[i];
-        hystgen_move(i, play, *from, w);
-        sum = sum + hystgen_model_tables.weight[i] * hystgen_rebent(i, play, bent, before);
+#ifdef HYSTGEN_HAS_ORDERED_PLAYS
+    for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_move(i, play, play[0], w); ++i) {
+        (void)hystgen_bent_anew(i, play[i], bent);
     }
+    sum = hystgen_with_staying(1, play, bent, sum);
+#else
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (hystgen_move(i, play, play[0], w)) {
+            (void)hystgen_bent_anew(i, play[i], bent);
+        }
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);
+    }
+#endif
     play[0] = w;
     return sum;
 }
@@ -105,15 +88,14 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_s
 /* The plays come to rest with their input at w. Returns their sum. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
                                                hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
-        sum = sum + hystgen_model_tables.weight[i] * hystgen_bent_anew(i, play[i], bent);
+        (void)hystgen_bent_anew(i, play[i], bent);
     }
     play[0] = w;
-    return sum;
+    return hystgen_with_staying(1, play, bent, (hystgen_sum_t)hystgen_model_tables.weight[0] * w);
 }
 
 /* Contributions of the plays, if they are bent. */
@@ -126,10 +108,9 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
-/* The plays come to rest with their input at w, and a search in fixed point begins anew. Updates
-   their sum. */
+/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
 static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
-#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
+#ifdef HYSTGEN_INVERSE
     self->search.slope = hystgen_model_tables.weight[0];
 #endif
     self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
@@ -152,8 +133,13 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return self->level;
 }
 
-#ifdef HYSTGEN_INVERSE
-#ifdef HYSTGEN_FIXED
+#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
+/* Contribution of play i at z. */
+static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
+                                                const hystgen_sum_t *bent, hystgen_play_t z) {
+    return z >= play[i] && z <= play[i] ? hystgen_staying(i, play, bent) : hystgen_bent(i, z);
+}
+
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
@@ -176,59 +162,6 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen
     }
     return sum;
 }
-#elif defined(HYSTGEN_HAS_BUMP)
-/* Play i with its input at that of the search. Sets the play's slope. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_tried(hystgen_inverse_t *self, unsigned int i) {
-    const hystgen_real_t w = self->search.input;
-    const hystgen_real_t z = hystgen_tried(i, self->play, w, &self->search.steep);
-    return self->moving ? z : hystgen_resting(i, self->play, w);
-}
-
-/* Adds play i to the sum and the slope of a search. In memory, which needs less stack than numbers
-   that are saved across a call. */
-HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) {
-    hystgen_search_t *search = &self->search;
-    const hystgen_real_t z = hystgen_inverse_tried(self, i);
-    const hystgen_real_t value = hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
-    search->left = search->left + hystgen_model_tables.weight[i] * value;
-    search->slope = search->slope + hystgen_bent_steep(i, z, value, search->steep);
-}
-
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
-   slope of the search to its change per change of w. */
-static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
-    unsigned int i;
-    self->search.left = hystgen_model_tables.weight[0] * w;
-    self->search.slope = hystgen_model_tables.weight[0];
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        hystgen_inverse_add(self, i);
-    }
-    return self->search.left;
-}
-#else
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. Sets the
-   slope of the search to its change per change of w. */
-static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
-    hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
-    hystgen_real_t slope = hystgen_model_tables.weight[0];
-    unsigned int i;
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        hystgen_real_t steep;
-        hystgen_real_t z = hystgen_tried(i, self->play, w, &steep);
-        if (!self->moving) {
-            z = hystgen_resting(i, self->play, w);
-        }
-        const hystgen_real_t value =
-            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-        slope = slope + hystgen_bent_steep(i, z, value, steep);
-    }
-    self->search.slope = slope;
-    return sum;
-}
-#endif
 #endif
 
 #endif

@@ -6,11 +6,11 @@
 #endif
 #include "compensator/chain/signals.c"
 
+#ifdef HYSTGEN_FIXED
 /* The search goes on from the input tried last by the slope of the sum, as long as that leads to an
    input inside the interval and it has not done so too often; else it halves the interval. Both
    ends of the interval are known to be beyond the solution, so that a wrong slope costs tries and
    nothing else. */
-#ifdef HYSTGEN_FIXED
 static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
     return x < 0 ? -x : x;
 }
@@ -107,51 +107,124 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     return (hystgen_reach_t)self->search.low + (self->search.short_of > self->search.over ? 1 : 0);
 }
 #else
-/* Tries an input. The interval ends there from now on. */
-HYSTGEN_APART bool hystgen_inverse_found(hystgen_inverse_t *self) {
-    hystgen_search_t *search = &self->search;
-    search->left = search->sum - hystgen_inverse_sum(self, search->input);
-    if (search->left <= HYSTGEN_CLOSE && search->left >= -HYSTGEN_CLOSE) {
-        return true;
+/* Adds play i, which moves, to the sum at the input tried, and to the sum's slope. */
+#ifdef HYSTGEN_HAS_MOVES_APART
+HYSTGEN_APART
+#else
+static inline
+#endif
+void hystgen_inverse_add(hystgen_attempt_t *at, unsigned int i, hystgen_real_t bump) {
+    hystgen_real_t change;
+    const hystgen_real_t value = hystgen_bent_steep(i, at->reached, bump, &change);
+    const hystgen_real_t weight = hystgen_model_tables.weight[i];
+    const hystgen_real_t more = weight * change;
+    at->sum = at->sum + weight * value;
+    at->steady = at->steady + more;
+    at->slope = at->slope + more * at->share;
+}
+
+/* The same, if play i moves. Returns whether it does. */
+#if defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_HAS_MOVES_APART)
+HYSTGEN_APART
+#else
+static inline
+#endif
+bool hystgen_inverse_tries(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigned int i) {
+    if (!hystgen_tried(self, at, i)) {
+        return false;
     }
-    if (search->left > 0) {
-        search->low = search->input;
-    } else {
-        search->high = search->input;
+    hystgen_inverse_add(at, i, hystgen_bump_at(at->reached));
+    return true;
+}
+
+/* Sums up the plays after their input has moved to the one tried, or at rest there; the sum
+   increases with it. */
+static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_t *at) {
+    const hystgen_real_t *bent = hystgen_operator_bent(self);
+    unsigned int i;
+#ifdef HYSTGEN_HAS_ORDERED_PLAYS
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_inverse_tries(self, at, i); ++i) {
     }
+    at->sum = hystgen_with_staying(i, self->play, bent, at->sum);
+#else
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (!hystgen_inverse_tries(self, at, i)) {
+            at->sum = at->sum + hystgen_model_tables.weight[i] * hystgen_staying(i, self->play, bent);
+        }
+    }
+#endif
+}
+
+/* left/slope. */
+static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slope) {
+    hystgen_real_t rate = HYSTGEN_RATE;
+    unsigned int i;
+    for (i = 0; i < HYSTGEN_TURNS; ++i) {
+        rate = rate + rate - slope * rate * rate;
+    }
+    return left * rate;
+}
+
+/* Goes on from try k to the next input: by the slope there, as long as that leads to an input
+   inside the interval and k is not too large; else to the middle of the interval. Both ends of the
+   interval are known to be beyond the solution, so that a wrong slope costs tries and nothing else.
+   Returns whether that input is the solution: the sum is so near that one more step leaves next to
+   nothing. It goes by the slope there if plays start to move softly, else by the middle of all
+   slopes. */
+#if !defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_HAS_DASHPOT_PLAYS)
+static inline
+#else
+HYSTGEN_APART
+#endif
+bool hystgen_inverse_solves(hystgen_attempt_t *at, unsigned int k) {
+
+    const hystgen_real_t left = at->asked - at->sum;
+    if (k > 0) {
+        if ((left <= HYSTGEN_CLOSE && left >= -HYSTGEN_CLOSE) ||
+            k == HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES) {
+#ifdef HYSTGEN_HAS_DASHPOT_PLAYS
+            at->input = at->input + hystgen_led(left, at->slope);
+#else
+            at->input = at->input + left * HYSTGEN_RATE;
+#endif
+            return true;
+        }
+        if (left > 0) {
+            at->low = at->input;
+        } else {
+            at->high = at->input;
+        }
+    }
+    if (k <= HYSTGEN_NEWTON_TRIES) {
+        at->input = at->input + hystgen_led(left, at->slope);
+    }
+    if (!(at->input > at->low && at->input < at->high)) {
+        at->input = at->low + (at->high - at->low) / 2;
+    }
+    at->slope = hystgen_model_tables.weight[0];
+    at->steady = at->slope;
+    at->sum = at->slope * at->input;
     return false;
 }
 
-/* Goes on to the next input; `newton`: by the slope. */
-HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool newton) {
-    hystgen_search_t *search = &self->search;
-    if (newton) {
-        hystgen_real_t rate = HYSTGEN_RATE;
-        unsigned int i;
-        for (i = 0; i < HYSTGEN_TURNS; ++i) {
-            rate = rate + rate - search->slope * rate * rate;
-        }
-        search->input = search->input + search->left * rate;
-    }
-    if (!(search->input > search->low && search->input < search->high)) {
-        search->input = search->low + (search->high - search->low) / 2;
-    }
-}
-
-/* Input of the plays at which their sum is h. The last step is by the reciprocal of a slope that is
-   right in the middle, and takes the sum no farther away for any other. */
+/* Input of the plays at which their sum is h. The search begins where the slope of the last one
+   leads. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
-    unsigned int i;
-    self->search.low = HYSTGEN_LEAST_INPUT;
-    self->search.high = HYSTGEN_LARGEST_INPUT;
-    self->search.input = self->play[0];
-    self->search.sum = h;
-    for (i = 0; i < HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES; ++i) {
-        if (hystgen_inverse_found(self)) {
-            return self->search.input + self->search.left * HYSTGEN_RATE;
-        }
-        hystgen_inverse_advance(self, i < HYSTGEN_NEWTON_TRIES);
+    hystgen_attempt_t at;
+    unsigned int k;
+    at.low = HYSTGEN_LEAST_INPUT;
+    at.high = HYSTGEN_LARGEST_INPUT;
+    at.input = self->play[0];
+    at.asked = h;
+    at.sum = self->level;
+    at.slope = self->search.slope;
+    at.steady = at.slope;
+    for (k = 0; !hystgen_inverse_solves(&at, k); ++k) {
+        hystgen_inverse_try(self, &at);
     }
-    return self->search.high;
+    self->search.slope = at.steady;
+    return at.input;
 }
 #endif

@@ -154,16 +154,22 @@ typedef struct {
     hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
-/* A search between two inputs of the plays for the one at which their sum is `sum`. It lies in the
-   memory of an operator, not on its stack. */
+/* An input of the plays that a search has tried. */
 typedef struct {
-    hystgen_real_t low;
+    hystgen_real_t low; /* the solution lies between these */
     hystgen_real_t high;
-    hystgen_real_t input; /* tried last, */
-    hystgen_real_t sum;
-    hystgen_real_t left;  /* what the sum lacks there, */
-    hystgen_real_t slope; /* and its change per change of the input; */
-    hystgen_real_t steep; /* that of one play */
+    hystgen_real_t input;
+    hystgen_real_t asked; /* sum of the plays that the solution has */
+    hystgen_real_t sum;   /* their sum at the input tried, */
+    hystgen_real_t slope; /* its change per change of the input, */
+    hystgen_real_t steady; /* and that in steady motion, in which plays follow in full; */
+    hystgen_real_t reached; /* value that one of them reaches there, */
+    hystgen_real_t share; /* and its share of a further change of the input */
+} hystgen_attempt_t;
+
+/* What a search for the input of the plays begins with. */
+typedef struct {
+    hystgen_real_t slope; /* change of their sum per change of their input, in steady motion */
 } hystgen_search_t;
 #endif
 

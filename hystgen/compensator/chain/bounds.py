@@ -91,10 +91,8 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
     """
     u = float(np.finfo(kind).eps) / 2
     t, static = compiled.tables.moving, compiled.static
-    p, r = np.abs(np.array(static.pi.weights)), np.array(static.pi.thresholds)
     low, high = static.play_range
-    size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
-    steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
+    size = 3.0 * max(abs(low), abs(high)) + float(static.pi.thresholds[-1])
     summed = moving.sum_rounding(static, compiled.parts.plays, u)
     play = 4.0 * u * size
     if t.moves == RELAXING:
@@ -106,11 +104,13 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
         (mover,), way = moving.movers(static, compiled.parts.plays), compiled.largest_way
         rows, ways = t.yields.astype(float), (way, moving.largest_stretch(static))
         stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
-        play = 8.0 * u * size + stretched
+        play = 8.0 * u * size + stretched + mover.disorder(rows, ways[1])  # plays that a sum takes to stay
         if emitted:
             play += float(t.number[SEEN]) * way  # below this the input counts as standing still
-    most, width = float(np.sum(p)) * steep, 3.0 * (high - low) * 2.0**-t.halves
-    return play, summed, most * u * size + max(most * width, float(t.number[CLOSE]))
+    most = moving.slopes(static, compiled.parts.plays, compiled.seconds)[1]
+    missed = most * 3.0 * (high - low) * 2.0**-t.halves
+    left = moving.residual(static, compiled.parts.plays, u)
+    return play, summed, most * u * size + (left if missed + summed <= float(t.number[CLOSE]) else max(missed, left))
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:

@@ -25,8 +25,8 @@ CELLS = 4096
 record shows; a search rejects widths below a twentieth of the range."""
 
 CLOSENESS = 0.125
-"""[bound of the sum's rounding error] A search in floating point ends this near to the sum asked for: sums of 10 plays
-are off by up to a 30th of their bound, so that nearly every search gets there."""
+"""[bound of the sum's rounding error] A search in floating point ends where its last step gets this near to the sum
+asked for: sums of 10 plays are off by up to a 30th of their bound, so that nearly every search gets there."""
 
 MOST_TURNS = 12
 """Most steps to the reciprocal of a slope: enough for slopes of which the least is a 400th of the largest; with
@@ -101,15 +101,8 @@ def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float
 
 def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
     """Least change of the sum per change of the plays' input, over their reach and any number of plays that follow."""
-    low, high = static.play_range
-    p, r = np.array(static.pi.weights), np.array(static.pi.thresholds)
-    at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
-    rows = np.tile(at, (len(p), 1))
-    for effect in effects:
-        if effect.bends_plays():
-            rows = effect.bent(rows, r)
-    steep = np.diff(rows, axis=1) / np.diff(at)
-    return float(np.min(np.cumsum(p[:, None] * steep, axis=0)))
+    p = np.array(static.pi.weights)
+    return float(np.min(np.cumsum(p[:, None] * _bends(static, effects)[1], axis=0)))
 
 
 def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, Array]:
@@ -155,6 +148,33 @@ def sum_rounding(static: StaticModel, effects: Sequence[Effect], unit: float) ->
     return (12.0 + len(static.pi.weights)) * unit * size * bent * float(np.sum(np.abs(static.pi.weights)))
 
 
+def residual(static: StaticModel, effects: Sequence[Effect], unit: float) -> float:
+    """What a search leaves of the sum after its last step."""
+    return CLOSENESS * sum_rounding(static, effects, unit)
+
+
+def closeness(
+    static: StaticModel, effects: Sequence[Effect], slopes: tuple[float, float], unit: float, turns: int,
+    varies: tuple[float, float] | None,
+) -> float:
+    """How far the sum may be from the one asked for so that one more step leaves no more than `residual`.
+
+    A step by the reciprocal of the middle of the slopes leaves `(most - least)/(most + least)` of the distance, or
+    less. With plays that start to move softly (`varies`, as in `Moved`), the slope changes by at most `J + M d` within
+    a step d, and a step by the slope where it begins leaves at most `J d + M d^2/2`; J includes the error of the
+    reciprocal.
+    """
+    left, (least, most) = residual(static, effects, unit), slopes
+    off = (most - least) / (most + least)
+    if varies is None:
+        return left / (off + 4.0 * unit)
+    p = np.abs(static.pi.weights)
+    steep = 1.0 + steepest_bend(static, effects)
+    jumps = float(np.sum(p[1:])) * steep * varies[0] + most * (math.pow(off, 2.0**turns) + 8.0 * unit)
+    bend = float(np.sum(p[1:])) * (steep * varies[1] + sharpest_bend(static, effects))
+    return least * 2.0 * left / (jumps + math.sqrt(jumps * jumps + 2.0 * bend * left))
+
+
 def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts: Array) -> tuple[float, float]:
     """Errors of the sum of plays whose input is shifted by up to `shifts` (n,), and the part that counts in the
     inverse, as an error of the sum that its gain `2/least_slope` multiplies."""
@@ -196,6 +216,11 @@ def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> f
 
 def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
     """Largest difference between the slope of a bent play and 1, the slope of the play itself."""
+    return float(np.max(np.abs(_bends(static, effects)[1] - 1.0)))
+
+
+def _bends(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, Array]:
+    """Slopes of the plays' contributions (n + 1, `CELLS`), and the width of the cells."""
     low, high = static.play_range
     r = np.array(static.pi.thresholds)
     at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
@@ -203,7 +228,13 @@ def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
     for effect in effects:
         if effect.bends_plays():
             rows = effect.bent(rows, r)
-    return float(np.max(np.abs(np.diff(rows, axis=1) / np.diff(at) - 1.0)))
+    return float(at[1] - at[0]), np.diff(rows, axis=1) / np.diff(at)
+
+
+def sharpest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
+    """Largest change of a bent play's slope per change of the play."""
+    cell, steep = _bends(static, effects)
+    return float(np.max(np.abs(np.diff(steep, axis=1)))) / cell
 
 
 def build(
@@ -216,9 +247,12 @@ def build(
     first, second, curve = np.zeros(n + 1), np.zeros(n + 1), np.zeros((n + 1, 1))
     moves, kind, yields = at.PLAIN, at.STRAIGHT, np.zeros((0, 5))
     number = np.zeros(at.SEEN + 1)
-    number[[at.LEAST_INPUT, at.LARGEST_INPUT, at.HALF]] = 2.0 * low - high, 2.0 * high - low, 0.5
+    number[[at.LEAST_INPUT, at.LARGEST_INPUT, at.HALF, at.ONE]] = 2.0 * low - high, 2.0 * high - low, 0.5, 1.0
+    varies = None
     for mover in movers(static, effects):
-        moves, first[1:], second[1:], yields, number[at.SEEN] = mover.numbers(seconds, largest_step, 3.0 * (high - low))
+        found = mover.numbers(seconds, largest_step, 3.0 * (high - low))
+        moves, first[1:], second[1:], yields, number[at.SEEN], _ = found
+        varies = found.varies if moves == at.DASHPOT else None
     for effect in effects:
         if effect.bends_plays():
             kind, rows, numbers, _ = BENDS.of(effect, r, p)
@@ -230,8 +264,11 @@ def build(
     turns = 0
     if not alone:
         unit = float(np.finfo(dtype).eps) / 2
-        number[at.RATE], turns = inverse_turns(*slopes(static, effects, seconds), unit)
-        number[at.CLOSE] = CLOSENESS * sum_rounding(static, effects, unit)
+        ends = slopes(static, effects, seconds)
+        number[at.RATE], turns = inverse_turns(*ends, unit)
+        number[at.CLOSE] = closeness(static, effects, ends, unit, turns, varies)
+        if (room := number[at.CLOSE] - sum_rounding(static, effects, unit)) > 0.0:  # an interval so narrow is enough
+            halves = min(halves, math.ceil(math.log2(3.0 * (high - low) * ends[1] / room)))
     alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])

@@ -9,7 +9,7 @@ from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import SECANT, SECANTS
+from hystgen.effects.plays import SECANT, SECANTS, FixedMovingTables
 from hystgen.plays.fixed import loop_solve, nearest, quotient
 
 
@@ -92,4 +92,10 @@ def asked(t: FixedChainTables, h: int) -> int:
     return inside << t.number.level_drop[0]
 
 
-PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search))
+@jit(inline=True)
+def ordered(_: FixedMovingTables) -> bool:
+    """Whether a sum takes plays behind the first one that stays to stay as well: here, each of them is looked at."""
+    return False
+
+
+PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search, ordered))

@@ -9,35 +9,37 @@ from hystgen.compensator.chain.layout import FloatChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import CLOSE, HALF, LARGEST_INPUT, LEAST_INPUT, NEWTON_TRIES, RATE
+from hystgen.effects import plays as at
 from hystgen.plays.loop import loop_solve
+from hystgen.plays.slots import zero
 
 
-def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar]]) -> Answer:
-    """The search of `moving_search.c`, from the function that gives the sum of the plays at an input, and its slope."""
+def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> Answer:
+    """The search of `moving_search.c`, from the function that gives the sum of the plays at an input and its slopes."""
 
     @jit
     def searched(t: FloatChainTables, s: ChainState, h: Scalar) -> Scalar:
-        """Input of the plays at which their sum is h: by Newton's method from the present input, within the interval of
-        inputs that are left, then by halving it."""
-        number = t.moving.number
-        low: Scalar = number[LEAST_INPUT]
-        high: Scalar = number[LARGEST_INPUT]
-        w: Scalar = s.plays.play[0]
-        for k in range(NEWTON_TRIES + t.moving.halves):
-            total, slope = sum_at(t, s, w)
+        """Input of the plays at which their sum is h: by Newton's method from where the slope of the last search leads,
+        within the interval of inputs that are left, then by halving it."""
+        number, m = t.moving.number, t.moving
+        low: Scalar = number[at.LEAST_INPUT]
+        high: Scalar = number[at.LARGEST_INPUT]
+        w: Scalar = s.plays.play[0] + (h - s.plays.step.level[0]) * inverse(t, s.bent[0])
+        k = 1
+        while True:
+            if not (w > low and w < high):  # nor is the end that was just tried
+                w = low + (high - low) * number[at.HALF]
+            total, slope, steady = sum_at(t, s, w)
             left = h - total
-            if left <= number[CLOSE] and left >= -number[CLOSE]:
-                return w + left * number[RATE]
-            if total < h:
+            if (left <= number[at.CLOSE] and left >= -number[at.CLOSE]) or k == at.NEWTON_TRIES + m.halves:
+                s.bent[0] = steady
+                return w + left * (inverse(t, slope) if m.moves == at.DASHPOT else number[at.RATE])
+            if left > zero(left):
                 low = w
             else:
                 high = w
-            if k < NEWTON_TRIES:
-                w = w + left * inverse(t, slope)
-            if not (w > low and w < high):  # nor is the end that was just tried
-                w = low + (high - low) * number[HALF]
-        return high
+            w = low if k > at.NEWTON_TRIES else w + left * inverse(t, slope)
+            k += 1
 
     return searched
 
@@ -45,7 +47,7 @@ def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar]]) -> Answer:
 @jit
 def inverse(t: FloatChainTables, slope: Scalar) -> Scalar:
     """1/slope, without division."""
-    rate: Scalar = t.moving.number[RATE]
+    rate: Scalar = t.moving.number[at.RATE]
     for _ in range(t.moving.turns):
         rate = rate + rate - slope * rate * rate
     return rate
@@ -57,4 +59,11 @@ def same(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed
     return x
 
 
-PLAYS = operators(Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, search))
+@jit(inline=True)
+def ordered(m: at.MovingTables) -> bool:
+    """Whether a sum takes plays behind the first one that stays to stay as well: if they keep the order of their
+    thresholds but for rounding, and `Mover.disorder`."""
+    return m.moves in (at.PLAIN, at.DASHPOT)
+
+
+PLAYS = operators(Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, search, ordered))

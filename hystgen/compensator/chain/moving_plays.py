@@ -21,13 +21,14 @@ class Kind(NamedTuple):
     solve: Function  # of plays, state and a sum: as engine loop
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
-    search: Function  # of functions from input to sum, and to sum and slope: the function that finds the input
+    search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
+    ordered: Function  # of moving tables: whether a sum takes plays behind the first one that stays to stay as well
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
     number."""
-    level, asked, solve, moves, (bent, steep), search = kind
+    level, asked, solve, moves, (bent, steep), search, ordered = kind
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
@@ -50,31 +51,40 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return total
 
     @jit
-    def tried_at(t: ChainTables, s: ChainState, w: Any) -> tuple[Any, Any]:
-        """The same, and its change per change of w, as if the plays were moved."""
-        m, plays, play = t.moving, t.plays, s.plays.play
+    def tried_at(t: ChainTables, s: ChainState, w: Any) -> tuple[Any, Any, Any]:
+        """The same, its change per change of w, and that in steady motion, in which plays follow in full."""
+        m, plays = t.moving, t.plays
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         slope = p[0]
+        steady = p[0]
+        follows = True
         for i in range(1, len(r)):
-            z, drawn = tried(m, r, i, s.plays, s.lost, w, p[i])
-            if not s.own.moving[0]:
-                z = resting(r, s.plays, i, w)
-            value = s.bent[i] if z == play[i] else bent(m, plays, i, z)
-            total = total + p[i] * value
-            slope = slope + steep(m, i, z, value, drawn)
-        return total, slope
+            if follows:
+                moves, z, share = tried(m, r, i, s.plays, s.lost, s.own.moving[0], w)
+                if moves:
+                    value, change = steep(m, plays, i, z)
+                    more = p[i] * change
+                    total = total + p[i] * value
+                    steady = steady + more
+                    slope = slope + more * share
+                    continue
+                follows = not ordered(m)
+            total = total + p[i] * s.bent[i]
+        return total, slope, steady
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
         """Move the plays while their input goes to w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
+        follows = True
         for i in range(1, len(r)):
-            before = s.play[i]
-            move(m, r, i, s, lost, w)
-            if s.play[i] != before:
-                values[i] = bent(m, plays, i, s.play[i])
+            if follows:
+                if move(m, r, i, s, lost, w):
+                    values[i] = bent(m, plays, i, s.play[i])
+                else:
+                    follows = not ordered(m)
             total = total + p[i] * values[i]
         s.play[0] = w
         return total
@@ -93,7 +103,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
         """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is the slope that a
-        search in fixed point begins with."""
+        search begins with."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         values[0] = p[0]

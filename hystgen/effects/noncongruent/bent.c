@@ -11,14 +11,16 @@ static inline hystgen_sum_t hystgen_bent(unsigned int i, hystgen_play_t z) {
     return z;
 }
 
-/* Change of this contribution per change of the plays' input: that of the play. */
-static inline hystgen_sum_t hystgen_bent_steep(unsigned int i, hystgen_play_t z,
-                                               hystgen_sum_t value, hystgen_sum_t steep) {
+#ifndef HYSTGEN_FIXED
+/* The same. Sets its change per change of z. */
+static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z,
+                                                hystgen_real_t bump, hystgen_real_t *steep) {
     (void)i;
-    (void)z;
-    (void)value;
-    return steep;
+    (void)bump;
+    *steep = 1;
+    return z;
 }
+#endif
 #elif defined(HYSTGEN_FIXED)
 /* Contribution at z of a play bent by curve c, in fixed point: z plus the value of the curve.
    Beyond the range of the plays a curve keeps its end value. */
@@ -42,48 +44,51 @@ HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
     return hystgen_bent_by(&hystgen_bump[curve], z);
 }
 #elif defined(HYSTGEN_HAS_BUMP)
-/* Contribution of play i at z: more or less than z around a centre. Play 0 is the input itself. */
-HYSTGEN_APART hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
-    const hystgen_real_t x = (z - HYSTGEN_CENTRE) * HYSTGEN_INVERSE_WIDTH;
-    return i == 0 ? z : z + HYSTGEN_BUMP * (hystgen_tanh(x) + HYSTGEN_TANH_CENTRE);
-}
-
-/* Change of the contribution of play i at z, `value`, per change of the plays' input, from that of
-   the play. */
-static hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z, hystgen_real_t value,
-                                         hystgen_real_t steep) {
-    const hystgen_real_t bump = (value - z) * HYSTGEN_INVERSE_BUMP - HYSTGEN_TANH_CENTRE;
-    const hystgen_real_t amplitude = HYSTGEN_BUMP * HYSTGEN_INVERSE_WIDTH;
+/* Contribution of play i at z: more or less than z around a centre. `bump`: hystgen_bump_at of z. Sets
+   its change per change of z. */
+static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z,
+                                                hystgen_real_t bump, hystgen_real_t *steep) {
     (void)i;
-    return steep + steep * (amplitude - amplitude * bump * bump);
+    *steep = HYSTGEN_STEEPEST - HYSTGEN_AMPLITUDE * bump * bump;
+    return z + HYSTGEN_BUMP * (bump + HYSTGEN_TANH_CENTRE);
 }
 #else
-/* Contribution of play i at z: a polynomial for each play. Play 0 is the input itself. */
-static hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
-    const hystgen_real_t x = z * HYSTGEN_INVERSE_SCALE;
-    hystgen_real_t sum = 0;
-    unsigned int k;
-    for (k = HYSTGEN_TERMS; k > 0; --k) {
-        sum = (sum + hystgen_curve[i][k - 1u]) * x;
-    }
-    return z + HYSTGEN_SCALE * (sum * x);
-}
-
-/* Change of the contribution of play i at z, `value`, per change of the plays' input, from that of
-   the play. */
-static hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z, hystgen_real_t value,
-                                         hystgen_real_t steep) {
+/* Contribution of play i at z: a polynomial for each play. Sets its change per change of z. */
+static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z,
+                                                hystgen_real_t bump, hystgen_real_t *steep) {
     const hystgen_real_t x = z * HYSTGEN_INVERSE_SCALE;
     hystgen_real_t sum = 0;
     hystgen_real_t slope = 0;
     unsigned int k;
-    (void)value;
+    (void)bump;
     for (k = HYSTGEN_TERMS; k > 0; --k) {
         sum = sum + hystgen_curve[i][k - 1u];
         slope = slope * x + sum;
         sum = sum * x;
     }
-    return steep + steep * (slope * x + sum);
+    *steep = 1 + (slope * x + sum);
+    return z + HYSTGEN_SCALE * (sum * x);
+}
+#endif
+
+#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
+/* tanh of the distance of z from the centre, in widths. */
+HYSTGEN_APART hystgen_real_t hystgen_bump_at(hystgen_real_t z) {
+    return hystgen_tanh((z - HYSTGEN_CENTRE) * HYSTGEN_INVERSE_WIDTH);
+}
+#elif !defined(HYSTGEN_FIXED)
+/* Nothing. */
+static inline hystgen_real_t hystgen_bump_at(hystgen_real_t z) {
+    (void)z;
+    return 0;
+}
+#endif
+
+#if defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_FIXED)
+/* Contribution of play i at z. */
+HYSTGEN_APART hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
+    hystgen_real_t steep;
+    return hystgen_bent_steep(i, z, hystgen_bump_at(z), &steep);
 }
 #endif
 
@@ -91,8 +96,8 @@ static hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z, hystg
 static inline hystgen_sum_t hystgen_bent_anew(unsigned int i, hystgen_play_t z,
                                               hystgen_sum_t *bent) {
 #ifdef HYSTGEN_HAS_BENT_PLAYS
-    bent[i] = hystgen_bent(i, z);
-    return bent[i];
+    bent[i - 1u] = hystgen_bent(i, z);
+    return bent[i - 1u];
 #else
     (void)i;
     (void)bent;

@@ -47,7 +47,7 @@ def _centred(effect: LoopCentre) -> Bent:
     begin = float(envelope.forward(0.0))
     numbers = {
         at.MIDDLE: effect.centre, at.INVERSE_WIDTH: inverse, at.BUMP: high,
-        at.INVERSE_BUMP: 1.0 / high if high else 0.0,
+        at.AMPLITUDE: effect.amplitude, at.STEEPEST: 1.0 + effect.amplitude,
         at.TANH_CENTRE: math.tanh(effect.centre / effect.width),
     }
     return Bent(
@@ -59,23 +59,8 @@ def _centred(effect: LoopCentre) -> Bent:
 
 
 @jit
-def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
-    """Contribution of play i at z."""
-    if t.bends == at.POLYNOMIAL:
-        x = z * t.number[at.INVERSE_SCALE]
-        total = z - z
-        for k in range(t.curve.shape[1] - 1, -1, -1):
-            total = (total + t.curve[i, k]) * x
-        return z + t.number[at.SCALE] * (total * x)
-    if t.bends == at.CENTRE:
-        x = (z - t.number[at.MIDDLE]) * t.number[at.INVERSE_WIDTH]
-        return z + t.number[at.BUMP] * (tanh(x, plays.tanh) + t.number[at.TANH_CENTRE])
-    return z
-
-
-@jit
-def steep(t: MovingTables, i: int, z: Any, value: Any, base: Any) -> Any:
-    """Change of play i's contribution at z, `value`, per change of the plays' input, from that of the play itself."""
+def steep(t: MovingTables, plays: Any, i: int, z: Any) -> tuple[Any, Any]:
+    """Contribution of play i at z, and its change per change of z."""
     if t.bends == at.POLYNOMIAL:
         x = z * t.number[at.INVERSE_SCALE]
         total = z - z
@@ -84,12 +69,19 @@ def steep(t: MovingTables, i: int, z: Any, value: Any, base: Any) -> Any:
             total = total + t.curve[i, k]
             slope = slope * x + total
             total = total * x
-        return base + base * (slope * x + total)
+        return z + t.number[at.SCALE] * (total * x), t.number[at.ONE] + (slope * x + total)
     if t.bends == at.CENTRE:
-        bump = (value - z) * t.number[at.INVERSE_BUMP] - t.number[at.TANH_CENTRE]
-        amplitude = t.number[at.BUMP] * t.number[at.INVERSE_WIDTH]
-        return base + base * (amplitude - amplitude * bump * bump)
-    return base
+        bump = tanh((z - t.number[at.MIDDLE]) * t.number[at.INVERSE_WIDTH], plays.tanh)
+        value = z + t.number[at.BUMP] * (bump + t.number[at.TANH_CENTRE])
+        return value, t.number[at.STEEPEST] - t.number[at.AMPLITUDE] * bump * bump
+    return z, t.number[at.ONE]
+
+
+@jit
+def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
+    """Contribution of play i at z."""
+    value, _ = steep(t, plays, i, z)
+    return value
 
 
 BENDS = PlaysPart(of, Bending(bent, steep), late("noncongruent"))

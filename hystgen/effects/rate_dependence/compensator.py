@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Effect, decays
 from hystgen.effects.part import Function, late
-from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
+from hystgen.effects.plays import DASHPOT, DILATED, ONE, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals, zero
@@ -79,7 +79,9 @@ class Movement:
         none, kind = np.zeros(len(self.taus)), self.moves(seconds)
         if self.dashpot:
             rows = pieces(self.dashpot, self.scale, seconds, span)
-            return Moved(kind, none, none, rows, seen_share(self.dashpot, self.scale, seconds, largest_step))
+            share = seen_share(self.dashpot, self.scale, seconds, largest_step)
+            jumps, bend = varying(rows, span)
+            return Moved(kind, none, none, rows, share, (share * jumps, share * share * bend))
         no_yields = np.zeros((0, C3 + 1))
         if kind == DILATED:
             return Moved(kind, np.asarray(self.betas) / seconds, none, no_yields, 0.0)
@@ -112,6 +114,10 @@ class Movement:
             lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits
         )
         return found
+
+    def disorder(self, rows: Array, top: float) -> float:
+        """By how much plays can leave the order of their thresholds, with stretches up to `top`."""
+        return disorder(rows, top) if self.dashpot else 0.0
 
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
         """Largest difference between the stretches of plays by the table and by the law."""
@@ -208,6 +214,16 @@ def pieces(effect: RelaxingPlays, scale: float, seconds: float, top: float) -> A
     return np.array(rows)
 
 
+def varying(rows: Array, top: float) -> tuple[float, float]:
+    """Sum of the jumps of the loss's slope over stretches up to `top`, and the largest change of the slope per change
+    of the stretch."""
+    begins, _, slopes, bends, thirds = rows.T
+    lengths = np.diff(begins, append=max(top, LONGEST * float(begins[-1])))
+    bent = np.abs([bends, bends + 3.0 * thirds * lengths])
+    ends = slopes + (2.0 * bends + 3.0 * thirds * lengths) * lengths
+    return float(np.sum(np.abs(slopes - np.append(0.0, ends[:-1])))), 2.0 * float(np.max(bent))
+
+
 def _piece(effect: RelaxingPlays, scale: float, seconds: float, at: float, ratio: float) -> tuple[float, ...]:
     (a, da), (b, db) = (yielded(effect, scale, seconds, x) for x in (at, at * ratio))
     length = at * (ratio - 1.0)
@@ -247,6 +263,19 @@ def stretch_error(
     return float(max(np.max(farther[reached]), np.max(nearer[reached])))
 
 
+def disorder(rows: Array, top: float) -> float:
+    """By how much a play can be stretched farther than one with a smaller threshold, stretches up to `top`.
+
+    Of two plays stretched by x and less in a step, the first keeps at least as much of its stretch as the other, except
+    for where the loss rises faster than the stretch.
+    """
+    x = np.linspace(0.0, top, 6001)
+    k = np.searchsorted(rows[:, BEGIN], x, side="right") - 1
+    on = x - rows[k, BEGIN]
+    slope = (3.0 * rows[k, C3] * on + 2.0 * rows[k, C2]) * on + rows[k, C1]
+    return float(np.sum(np.maximum(slope - 1.0, 0.0)) * (x[1] - x[0]))
+
+
 # ---------------------------------------------------------------- moved.c and dashpot.c, in any arithmetic
 
 
@@ -261,29 +290,31 @@ def stretch(x: Any, r: Any) -> Any:
 
 
 def movement(
-    share_of: Function, yields: Function, seen: Function, moved_by: Function, yield_of: Function
+    share_of: Function, yields: Function, seen: Function, moved_by: Function, yield_of: Function, *,
+    at_rest: bool = False,
 ) -> tuple[Function, Function, Function, Function]:
     """`moved`, `move`, `put` and `rest` of `Moves`, from the functions in which arithmetics differ: x times a play's
     factor; a stretch's yield in a step; the part of a way at which the input counts as standing still; the move of a
-    play for its yield, and the reverse."""
+    play for its yield, and the reverse; `at_rest`: whether a play that is not stretched keeps its remainder."""
 
     @jit
-    def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-        """Move, as a yield, of play i with a nonlinear dashpot while the input of the plays goes to w."""
+    def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> tuple[Any, bool]:
+        """Move, as a yield, of play i with a nonlinear dashpot while the input of the plays goes to w, and whether the
+        play is stretched."""
         x = s.play[0] + seen(m, w - s.play[0]) - s.play[i]
-        gained = zero(x)
-        if x > r[i]:
-            gained = yields(m, x - r[i])
-        elif x < -r[i]:
-            gained = -yields(m, -x - r[i])
-        return gained + lost[i]
+        on = (-x if x < zero(x) else x) - r[i]
+        if not on > zero(on):
+            return lost[i], False
+        gained = yields(m, on)
+        return lost[i] - gained if x < zero(x) else lost[i] + gained, True
 
     @jit
     def moved(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
         """Play i after the input of the plays has gone to w."""
         q = s.play[i]
         if m.moves == DASHPOT:
-            return q + moved_by(m, change(m, r, i, s, lost, w))
+            gained, _ = change(m, r, i, s, lost, w)
+            return q + moved_by(m, gained)
         if m.moves == RELAXING:
             return q + share_of(m.first, i, stretch(w - q, r[i]))
         threshold = r[i]
@@ -297,15 +328,17 @@ def movement(
         return low if upper < low else upper
 
     @jit
-    def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> None:
-        """Move play i while the input of the plays goes to w."""
+    def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> bool:
+        """Move play i while the input of the plays goes to w. Returns whether it moves."""
+        before = s.play[i]
         if m.moves == DASHPOT:
-            gained = change(m, r, i, s, lost, w)
-            z = s.play[i] + moved_by(m, gained)
-            lost[i] = gained - yield_of(m, z - s.play[i])
-            s.play[i] = z
-        else:
-            s.play[i] = moved(m, r, i, s, lost, w)
+            gained, stretched = change(m, r, i, s, lost, w)
+            if stretched or not at_rest:
+                s.play[i] = before + moved_by(m, gained)
+                lost[i] = gained - yield_of(m, s.play[i] - before)
+            return stretched or not at_rest
+        s.play[i] = moved(m, r, i, s, lost, w)
+        return bool(s.play[i] != before)
 
     @jit
     def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
@@ -340,21 +373,20 @@ def piece(t: MovingTables, x: Any) -> int:
 
 
 @jit
-def yields(t: MovingTables, x: Any) -> Any:
-    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0."""
-    k = piece(t, x)
-    on = x - t.yields[k, BEGIN]
-    return ((t.yields[k, C3] * on + t.yields[k, C2]) * on + t.yields[k, C1]) * on + t.yields[k, C0]
-
-
-@jit
-def yielding(t: MovingTables, x: Any, weight: Any) -> Any:
-    """Change of the yield at stretch x > 0 per change of the plays' input, times a weight."""
+def yielding(t: MovingTables, x: Any) -> tuple[Any, Any]:
+    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0, and its change per change of x."""
     k = piece(t, x)
     on = x - t.yields[k, BEGIN]
     bend = t.yields[k, C3] * on
     slope = (bend + bend + bend + t.yields[k, C2] + t.yields[k, C2]) * on + t.yields[k, C1]
-    return weight * t.number[SEEN] * slope
+    return ((bend + t.yields[k, C2]) * on + t.yields[k, C1]) * on + t.yields[k, C0], slope
+
+
+@jit
+def yields(t: MovingTables, x: Any) -> Any:
+    """The yield alone."""
+    y, _ = yielding(t, x)
+    return y
 
 
 @jit(inline=True)
@@ -410,33 +442,36 @@ def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
     return w
 
 
-moved, move, put, rest = movement(share_of, yields, seen, unchanged, unchanged)
+moved, move, put, rest = movement(share_of, yields, seen, unchanged, unchanged, at_rest=True)
 
 
 @jit
-def tried(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, weight: Any) -> tuple[Any, Any]:
-    """Play i after the input of the plays has gone to w, and its change per change of w, times a weight."""
-    q = s.play[i]
-    if t.moves == DASHPOT:
-        on = stretch(s.play[0] + seen(t, w - s.play[0]) - q, r[i])
-        steep = zero(on) if on == zero(on) else yielding(t, on if on > zero(on) else -on, weight)
-        return moved(t, r, i, s, lost, w), steep
+def tried(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, moving: bool, w: Any) -> tuple[bool, Any, Any]:
+    """Whether play i moves when the input of the plays goes to w, or comes to rest there; the value it reaches, and its
+    share of a further change of w."""
+    q, x = s.play[i], s.play[0]
+    one = t.number[ONE]
+    if t.moves == DASHPOT and moving:
+        x = x + seen(t, w - x) - q
+        on = (-x if x < zero(x) else x) - r[i]
+        if not on > zero(on):
+            return False, q, one
+        gained, slope = yielding(t, on)
+        return True, q + (lost[i] - gained if x < zero(x) else lost[i] + gained), slope * t.number[SEEN]
     if t.moves == RELAXING:
         on = stretch(w - q, r[i])
-        return q + share_of(t.first, i, on), zero(on) if on == zero(on) else share_of(t.first, i, weight)
-    way = w - s.play[0]
+        share = t.first[i] if moving else one
+        return on != zero(on), q + on * share, share
     threshold = r[i]
-    wider = zero(weight)
+    wider = zero(q)
     if t.moves == DILATED:
-        threshold = r[i] + share_of(t.first, i, way if way > zero(way) else -way)
-        wider = share_of(t.first, i, weight)
-    low = w - threshold
-    high = w + threshold
-    if q > low and q < high:
-        return q, zero(weight)
-    if q <= low:
-        return low, weight - wider if way >= zero(way) else weight + wider
-    return high, weight + wider if way > zero(way) else weight - wider
+        way = w - x if moving else wider
+        grows = (-one if way < zero(way) else one) if moving else wider
+        threshold = r[i] + t.first[i] * (-way if way < zero(way) else way)
+        wider = grows * t.first[i]
+    if w - threshold > q:
+        return True, w - threshold, one - wider
+    return w + threshold < q, w + threshold, one + wider
 
 
 MOVES = PlaysPart(

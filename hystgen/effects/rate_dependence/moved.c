@@ -21,13 +21,20 @@ static hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play, 
 }
 
 #ifndef HYSTGEN_FIXED
-/* The same; `steep`: the play's change with w, times its weight. */
-static inline hystgen_real_t hystgen_tried(unsigned int i, const hystgen_real_t *play,
-                                           hystgen_real_t w, hystgen_real_t *steep) {
+/* Whether play i moves while its input moves to w, or comes to rest there. Sets the value it
+   reaches, and its share of a further change of w. */
+#ifdef HYSTGEN_HAS_MOVES_APART
+HYSTGEN_APART
+#else
+static inline
+#endif
+bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigned int i) {
+    const hystgen_real_t *play = self->play;
+    const hystgen_real_t w = at->input;
     const hystgen_real_t on = hystgen_stretch(w - play[i], hystgen_model_tables.threshold[i]);
-    const hystgen_real_t weight = hystgen_model_tables.weight[i];
-    *steep = on < 0 || on > 0 ? hystgen_share_of(weight, &hystgen_late[i]) : 0;
-    return play[i] + hystgen_share_of(on, &hystgen_late[i]);
+    at->share = self->moving ? hystgen_late[i] : 1;
+    at->reached = play[i] + on * at->share;
+    return on < 0 || on > 0;
 }
 #endif
 
@@ -65,28 +72,39 @@ static hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play, 
 }
 
 #ifndef HYSTGEN_FIXED
-/* The same, from where it is; `steep`: the play's change with w, times its weight, which is less
-   while the band around w grows in this direction and more while it shrinks. */
-static inline hystgen_real_t hystgen_tried(unsigned int i, const hystgen_real_t *play,
-                                           hystgen_real_t w, hystgen_real_t *steep) {
-    const hystgen_real_t way = w - play[0];
-    const hystgen_real_t r = hystgen_widened(i, way > 0 ? way : -way);
-    const hystgen_real_t weight = hystgen_model_tables.weight[i];
-#ifdef HYSTGEN_HAS_DILATED_PLAYS
-    const hystgen_real_t wider = hystgen_share_of(weight, &hystgen_wider[i]);
+/* Whether play i moves while its input moves to w, or comes to rest there. Sets the value it
+   reaches, and its share of a further change of w, which is less than all of it while the band
+   around w grows in this direction and more while it shrinks. */
+#ifdef HYSTGEN_HAS_MOVES_APART
+HYSTGEN_APART
 #else
-    const hystgen_real_t wider = 0;
+static inline
 #endif
-    if (play[i] <= w - r) {
-        *steep = way >= 0 ? weight - wider : weight + wider;
-        return w - r;
+bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigned int i) {
+    const hystgen_real_t *play = self->play;
+    const hystgen_real_t w = at->input;
+#ifdef HYSTGEN_HAS_DILATED_PLAYS
+    const hystgen_real_t way = self->moving ? w - play[0] : 0;
+    const hystgen_real_t side = way < 0 ? -1 : 1;
+    const hystgen_real_t grows = self->moving ? side : 0;
+    const hystgen_real_t r = hystgen_widened(i, way < 0 ? -way : way);
+    if (w - r > play[i]) {
+        at->reached = w - r;
+        at->share = 1 - grows * hystgen_wider[i];
+        return true;
     }
-    if (play[i] >= w + r) {
-        *steep = way > 0 ? weight + wider : weight - wider;
-        return w + r;
+    at->reached = w + r;
+    at->share = 1 + grows * hystgen_wider[i];
+#else
+    const hystgen_real_t r = hystgen_model_tables.threshold[i];
+    at->share = 1;
+    if (w - r > play[i]) {
+        at->reached = w - r;
+        return true;
     }
-    *steep = 0;
-    return play[i];
+    at->reached = w + r;
+#endif
+    return w + r < play[i];
 }
 #endif
 

@@ -19,15 +19,14 @@ static inline int64_t hystgen_yield_of(int64_t moved) {
 
 /* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with
    HYSTGEN_YIELD_BITS bits below a step of the plays' input: a piecewise cubic as in hystgen_curve,
-   each piece with the bits that its values leave out; never more than x. Leaves `slope` alone. */
-static int64_t hystgen_yield(int64_t x, const int64_t *slope) {
+   each piece with the bits that its values leave out; never more than x. */
+static int64_t hystgen_yield(int64_t x) {
     const uint32_t whole = (uint32_t)x;
     const uint32_t inside = whole > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : whole;
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
     int64_t y = 0;
     unsigned int k;
-    (void)slope;
     while (high - low > 1u) {
         const unsigned int middle = (low + high) / 2;
         const bool before = inside < hystgen_yields[middle].begin;
