@@ -16,12 +16,14 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.chain import moving, moving_fixed, moving_float
-from hystgen.effects.plays import CLOSE, LARGEST_INPUT, LEAST_INPUT, NEWTON_TRIES, SECANTS
+from hystgen.effects.plays import CLOSE, FASTEST, LARGEST_INPUT, LEAST_INPUT, NEWTON_TRIES, SECANTS
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
 
 FARTHEST = 2**31 - 1
+RATE_BITS = 40
+"""Of a sum that rises by 2^9 or more a step."""
 
 
 def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
@@ -48,8 +50,8 @@ def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: 
         tries[0] += state is s
         return total(w)
 
-    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near))
-    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[slope])
+    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near, rate_bits=RATE_BITS))
+    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[min(max(2**RATE_BITS // slope, 1), FASTEST)])
     with jit.plain():
         answer = moving_fixed.search(sum_at, None)(t, s, h)
     return int(answer), tries[0]
@@ -101,13 +103,14 @@ def test_quotients_are_exact_to_a_part_in_2_28() -> None:
     rng = np.random.default_rng(1)
     for _ in range(3000):
         x, y = (int(2.0 ** rng.uniform(0.0, 61.9)) for _ in range(2))
-        exact = Fraction(x, y)
-        found = int(fixed.quotient.py_func(x, y))
+        bits = int(rng.integers(0, 63))
+        exact = Fraction(x, y) * 2**bits
+        found = int(fixed.quotient.py_func(x, y, bits))
         if exact < 2**60:
             assert abs(found - exact) <= Fraction(1, 2) + Fraction(1, 2**20) + exact / 2**28
         else:
             assert found >= 2**59
-    assert fixed.quotient.py_func(0, 5) == 0
+    assert fixed.quotient.py_func(0, 5, 3) == 0
 
 
 # ---------------------------------------------------------------- thresholds by rate, in floating point

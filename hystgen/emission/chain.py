@@ -285,7 +285,7 @@ def instance(
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * bent,
+        *(t.form.contributions(plays) if bent else ()),
         *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
     ]
 

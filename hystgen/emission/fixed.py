@@ -135,6 +135,9 @@ class FixedForm(Form):
         numbers: list[Macro] = [
             ("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search"),
             ("NEAR", operand(plays.near), "least change of the sum with half a step of the input"),
+            ("RATE_BITS", f"{plays.rate_bits}u", "of steps of the input per change of the sum, below one"),
+            ("HALF_RATE", f"{(1 << plays.rate_bits - 32) // 2}u", "half a step where its lower word is left out"),
+            ("FASTEST", f"{moving.FASTEST}", "largest rate"),
             ("SECANT", f"{moving.SECANT}", "least length of a secant, in steps of the input"),
             ("SECANTS", f"{moving.SECANTS}u", "tries of a search by secants, before those by halving"),
         ]
@@ -213,6 +216,12 @@ class FixedForm(Form):
 
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
+
+    def contributions(self, plays: int) -> list[Field]:
+        return [
+            Field("signal_t", "staying", "sum of the plays that have not moved lately"),
+            Field("unsigned int", "released", "the last of the plays that have"),
+        ]
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [

@@ -43,6 +43,9 @@
 #define HYSTGEN_NEAR 500
 #define HYSTGEN_SECANT 64
 #define HYSTGEN_SECANTS 10u
+#define HYSTGEN_FASTEST 0x7fffffff
+#define HYSTGEN_RATE_BITS 60u
+#define HYSTGEN_HALF_RATE 134217728u
 #define HYSTGEN_SHARE_BITS 0u
 #define HYSTGEN_BRAKED_DROP 4u
 #define HYSTGEN_BUMP_DEGREE 5u
@@ -135,6 +138,8 @@ typedef struct {
 #ifndef HYSTGEN_HAS_CORNERS
     hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
     hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+    hystgen_sum_t staying;
+    unsigned int released;
     hystgen_search_t search;
 #else
     bool sought;

@@ -47,6 +47,137 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 }
 #endif
 
+#if defined(HYSTGEN_HAS_BENT_PLAYS) && defined(HYSTGEN_FIXED)
+/* Takes the plays up to i out of the sum of those that stay. */
+static void hystgen_operator_released(hystgen_operator_t *self, unsigned int i) {
+    while (self->released < i) {
+        const unsigned int k = self->released + 1u;
+        self->staying -= hystgen_model_tables.weight[k] * hystgen_bent(k, self->play[k]);
+        self->released = k;
+    }
+}
+
+/* Play i after the input of the plays has moved to w, or at rest at w. */
+static inline hystgen_play_t hystgen_operator_reached(const hystgen_operator_t *self,
+                                                      unsigned int i, hystgen_play_t w) {
+    return self->moving ? hystgen_reached(i, self->play, self->play[0], w)
+                        : hystgen_resting(i, self->play, w);
+}
+
+/* Takes the plays up to the last one that leaves its place for w out of the sum. Plays that move
+   with their input alone leave in the order of their thresholds. */
+HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_play_t w) {
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = self->released + 1u; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (hystgen_operator_reached(self, i, w) != self->play[i]) {
+            hystgen_operator_released(self, i);
+        }
+#ifdef HYSTGEN_HAS_PLAIN_PLAYS
+        else {
+            break;
+        }
+#endif
+    }
+}
+
+/* Sum of the plays with their input at w, for which those that move are released. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_added(const hystgen_operator_t *self,
+                                                   hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= self->released; ++i) {
+        const hystgen_play_t z = hystgen_operator_reached(self, i, w);
+        sum += hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+    }
+    return sum;
+}
+
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
+static inline hystgen_sum_t hystgen_operator_sum(hystgen_operator_t *self, hystgen_play_t w) {
+#ifdef HYSTGEN_INVERSE
+    if (self->search.known && self->search.input == w) {
+        return self->search.found;
+    }
+#endif
+    hystgen_operator_release(self, w);
+    return hystgen_operator_added(self, w);
+}
+
+/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
+HYSTGEN_APART void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
+    unsigned int i;
+    self->staying = 0;
+    self->released = 0;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_put(i, self->play, hystgen_resting(i, self->play, w));
+        self->staying += hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
+    }
+    self->play[0] = w;
+#ifdef HYSTGEN_INVERSE
+    self->search.rate = HYSTGEN_FASTEST;
+    self->search.known = false;
+#endif
+    self->level =
+        hystgen_level((hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying);
+}
+
+/* The plays move while their input moves to w, at which their sum is `sum`. All of them stay again
+   once the last of those released does. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w,
+                                         hystgen_sum_t sum) {
+    const unsigned int last = self->released;
+    const hystgen_play_t before = self->play[last];
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_move(i, self->play, self->play[0], w);
+    }
+    self->play[0] = w;
+    if (self->play[last] == before) {
+        self->staying = sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+        self->released = 0;
+    }
+}
+
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
+/* Updates the plays to their rest values with the input held, as of one step later. */
+HYSTGEN_APART void hystgen_operator_relax(hystgen_operator_t *self) {
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t rest = hystgen_relaxed(i, self->play);
+        if (rest != self->play[i]) {
+            hystgen_operator_released(self, i);
+            self->play[i] = rest;
+        }
+    }
+}
+#endif
+
+/* The plays follow their input w. Updates their sum. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        const hystgen_sum_t sum = hystgen_operator_sum(self, w);
+        self->level = hystgen_level(sum);
+        hystgen_operator_move(self, w, sum);
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
+        hystgen_operator_relax(self);
+#endif
+#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
+        self->search.input = w; /* where the next search begins, with the same sum */
+        self->search.found = sum;
+        self->search.known = true;
+#elif defined(HYSTGEN_INVERSE)
+        self->search.known = false;
+#endif
+    } else {
+        hystgen_operator_settle_plays(self, w);
+    }
+}
+#else
 #ifdef HYSTGEN_HAS_BENT_PLAYS
 /* Contribution of play i at z; `bent` holds the contribution at the play's rest value. */
 static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
@@ -130,7 +261,7 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
    their sum. */
 static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
 #if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
-    self->search.slope = hystgen_model_tables.weight[0];
+    self->search.rate = HYSTGEN_FASTEST;
 #endif
     self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
 }
@@ -146,6 +277,8 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
     }
 }
 
+#endif
+
 /* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     hystgen_operator_settle_plays(self, self->play[0]);
@@ -153,26 +286,24 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
 }
 
 #ifdef HYSTGEN_INVERSE
-#ifdef HYSTGEN_FIXED
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_BENT_PLAYS)
+/* The sum is that of both operators. */
+#elif defined(HYSTGEN_FIXED)
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     if (self->moving) {
         for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_sum_t value =
-                hystgen_contributed(i, self->play, hystgen_operator_bent(self),
-                                    hystgen_reached(i, self->play, self->play[0], w));
-            sum = sum + hystgen_model_tables.weight[i] * value;
+            sum = sum + (hystgen_sum_t)hystgen_model_tables.weight[i] *
+                            hystgen_reached(i, self->play, self->play[0], w);
         }
         return sum;
     }
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value =
-            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
+        sum = sum + (hystgen_sum_t)hystgen_model_tables.weight[i] *
+                        hystgen_resting(i, self->play, w);
     }
     return sum;
 }
@@ -199,7 +330,7 @@ HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) 
 static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
     unsigned int i;
     self->search.left = hystgen_model_tables.weight[0] * w;
-    self->search.slope = hystgen_model_tables.weight[0];
+    self->search.rate = HYSTGEN_FASTEST;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_inverse_add(self, i);

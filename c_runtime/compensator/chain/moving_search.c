@@ -22,14 +22,18 @@ HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_
     self->search.short_of = 0;
     self->search.over = -1;
     self->search.sum = hystgen_asked(h);
-    self->search.input = self->play[0];
     self->search.before = self->play[0];
+    if (self->search.input != self->play[0]) {
+        self->search.input = self->play[0];
+        self->search.known = false;
+    }
 }
 
 /* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
    search is over. */
 HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t found) {
     search->found = found;
+    search->known = true;
     if (found < search->sum) {
         search->low = search->input;
         search->short_of = search->sum - found;
@@ -40,26 +44,42 @@ HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t 
     return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
 }
 
-/* Updates the slope to that of the secant through the last two inputs, if they are far apart. */
-HYSTGEN_APART void hystgen_inverse_turn(hystgen_inverse_t *self) {
-    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)self->search.input - self->search.before);
+/* Updates the rate to that of the secant through the last two inputs, if they are far apart. */
+HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
+    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->before);
     if (way >= HYSTGEN_SECANT) {
-        const hystgen_sum_t gained = hystgen_size(self->search.found - self->search.last);
-        const hystgen_sum_t slope = hystgen_quotient(gained, way);
-        self->search.slope = slope > 1 ? slope : 1;
+        const hystgen_sum_t gained = hystgen_size(search->found - search->last);
+        const hystgen_sum_t rate = hystgen_quotient(way, gained > 1 ? gained : 1, HYSTGEN_RATE_BITS);
+        search->rate = (uint32_t)(rate < 1 ? 1 : rate > HYSTGEN_FASTEST ? HYSTGEN_FASTEST : rate);
     }
 }
 
-/* The way from the input tried last to the solution by the slope. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_left(const hystgen_inverse_t *self) {
-    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum),
-                            self->search.slope);
+/* The input to which the rate leads from the one tried last, at least one on and not beyond all. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
+    const bool rising = search->found < search->sum;
+    const hystgen_sum_t input = search->input;
+    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
+    const uint64_t left = (uint64_t)hystgen_size(search->found - search->sum);
+    const uint64_t steps = hystgen_wide((uint32_t)(left >> HYSTGEN_WORD), search->rate) +
+                           (hystgen_wide((uint32_t)left, search->rate) >> HYSTGEN_WORD);
+    const hystgen_sum_t way =
+        (hystgen_sum_t)((steps + HYSTGEN_HALF_RATE) >> (HYSTGEN_RATE_BITS - HYSTGEN_WORD));
+    const hystgen_sum_t some = way > 1 ? way : 1;
+    const hystgen_sum_t inside = some > room ? room : some;
+    return rising ? input + inside : input - inside;
 }
 
-/* Goes on to an input inside the interval, or else to its middle. */
-HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t next) {
+/* Goes on to the next input: by the rate of a secant, if that leads inside the interval and has not
+   been tried too often; else to the middle of the interval. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search, bool secant) {
+    hystgen_sum_t next = search->input; /* an end of the interval */
+    if (secant) {
+        hystgen_inverse_turn(search);
+        next = hystgen_inverse_further(search);
+    }
     search->before = search->input;
     search->last = search->found;
+    search->known = false;
     if (next > search->low && next <= search->top) {
         search->input = (hystgen_play_t)next;
     } else {
@@ -68,35 +88,13 @@ HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t ne
     }
 }
 
-/* The input a way on from the one tried last, at least one and not beyond all. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search,
-                                                    hystgen_sum_t way) {
-    const bool rising = search->found < search->sum;
-    const hystgen_sum_t input = search->input;
-    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
-    const hystgen_sum_t some = way > 1 ? way : 1;
-    const hystgen_sum_t inside = some > room ? room : some;
-    return rising ? input + inside : input - inside;
-}
-
-/* Goes on to the next input: by the slope of a secant, or, after too many tries, to the middle of
-   the interval, which the input tried last is an end of. */
-HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool secant) {
-    hystgen_sum_t next = self->search.input;
-    if (secant) {
-        hystgen_inverse_turn(self);
-        next = hystgen_inverse_further(&self->search, hystgen_inverse_left(self));
-    }
-    hystgen_inverse_go(&self->search, next);
-}
-
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
     unsigned int tries = 0;
     hystgen_inverse_seek(self, h);
     while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
-        hystgen_inverse_advance(self, tries < HYSTGEN_SECANTS);
+        hystgen_inverse_advance(&self->search, tries < HYSTGEN_SECANTS);
         if (tries < HYSTGEN_SECANTS) {
             ++tries;
         }

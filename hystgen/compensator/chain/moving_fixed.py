@@ -9,7 +9,7 @@ from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import SECANT, SECANTS
+from hystgen.effects.plays import FASTEST, SECANT, SECANTS, FixedMovingTables
 from hystgen.plays.fixed import loop_solve, nearest, quotient
 
 
@@ -20,16 +20,26 @@ def size(x: int) -> int:
 
 
 @jit
-def input_after(t: FixedChainTables, w: int, left: int, slope: int) -> int:
-    """The input that `slope` leads to from w, at least one on and none beyond all."""
-    farthest = t.moving.farthest
-    room = farthest - w if left > 0 else farthest + w
-    step = quotient(size(left), slope)
+def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
+    """The input to which the change `left` of the sum leads from w by a rate, at least one on and none beyond all."""
+    room = m.farthest - w if left > 0 else m.farthest + w
+    more = size(left)
+    step = (more >> 32) * rate + (((more & 0xFFFFFFFF) * rate) >> 32)
+    step = (step + ((1 << (m.rate_bits - 32)) >> 1)) >> (m.rate_bits - 32)
     if step < 1:
         step = step + 1
     if step > room:
         step = room
     return w + step if left > 0 else w - step
+
+
+@jit
+def secant(m: FixedMovingTables, way: int, gained: int) -> int:
+    """The rate of a sum that changed by `gained` over `way`, no less than 1 nor more than at the least slope."""
+    rate = quotient(way, gained if gained > 0 else gained + 1, m.rate_bits)
+    if rate < 1:
+        return rate + 1
+    return rate if rate < FASTEST else FASTEST
 
 
 def search(sum_at: Callable[..., int], _: object) -> Answer:
@@ -40,8 +50,9 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
         """Input of the plays at which their sum is h: by secants from the present input, the first one as steep as the
         last of the sample before, within the interval of inputs that are left, then by halving it. The nearer of two
         neighbours, or the input beyond the farthest if even that is not enough."""
-        low = -t.moving.farthest - 1
-        high = t.moving.farthest + 1
+        m = t.moving
+        low = -m.farthest - 1
+        high = m.farthest + 1
         short = 0  # of the sum at `low`; ends beyond the farthest input are not tried, but taken if they remain
         over = -1  # and at `high`
         w = s.plays.play[0]
@@ -50,24 +61,24 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
         tries = 0
         while True:
             total = sum_at(t, s, w)
-            if total < h:
+            left = h - total
+            if left > 0:
                 low = w
-                short = h - total
+                short = left
             else:
                 high = w
-                over = total - h
-            if size(total - h) <= t.moving.near:
+                over = -left
+            if size(left) <= m.near:
                 return w
             if high - low == 1:
                 return high if short > over else low
             way = size(w - before)
             if tries < SECANTS and way >= SECANT:
-                slope = quotient(size(total - last), way)
-                s.bent[0] = slope if slope > 0 else slope + 1
+                s.bent[0] = secant(m, way, size(total - last))
             before = w
             last = total
             if tries < SECANTS:
-                w = input_after(t, w, h - total, s.bent[0])
+                w = input_after(m, w, left, s.bent[0])
             if w <= low or w >= high:  # nor is the end that was just tried
                 w = low + (high - low) // 2
             tries += 1

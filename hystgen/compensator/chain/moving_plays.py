@@ -8,7 +8,7 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
-from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Bending, Moves
+from hystgen.effects.plays import FASTEST, PLAIN, RELAXING, STRAIGHT, Bending, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
 from hystgen.plays.slots import Reals
 
@@ -92,11 +92,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is the slope that a
+        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is the rate that a
         search in fixed point begins with."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
-        values[0] = p[0]
+        values[0] = FASTEST
         for i in range(1, len(r)):
             put(m, i, s, lost, resting(r, s, i, w))
             values[i] = bent(m, plays, i, s.play[i])
