@@ -77,9 +77,8 @@ class Family(ABC):
     `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: of file names
     that have none in floating point; `chain_types`: files with the types of effects; `helpers`: with functions that
     several effects call; `curves`: with a memoryless part whose stages are not called one by one; `codes`: with codes;
-    `moves_apart`: whether moving and bending plays takes less stack in separate functions; `opening`: headers before
-    all code of a file; in a single header they stand between `opening_apart` and `closing`, so that they do not affect
-    the code that includes it.
+    `opening`: headers before all code of a file; in a single header they stand between `opening_apart` and `closing`,
+    so that they do not affect the code that includes it.
     """
 
     arithmetic: Arithmetic
@@ -89,7 +88,6 @@ class Family(ABC):
     kind: ClassVar[str]
     form: ClassVar[str]
     ending: ClassVar[str]
-    moves_apart: ClassVar[bool]
     chain_types: ClassVar[tuple[str, ...]]
     curves: ClassVar[tuple[str, ...]]
     codes: ClassVar[tuple[str, ...]]
@@ -191,7 +189,7 @@ def _apart(holds: bool, otherwise: str = "static ") -> str:
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
-    kind, form, ending, moves_apart = "float", "floating", "", False
+    kind, form, ending = "float", "floating", ""
     chain_types, curves, codes = CHAIN_TYPES, (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
@@ -222,7 +220,7 @@ class FloatFamily(Family):
 class FixedFamily(Family):
     """Fixed point."""
 
-    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", True
+    kind, form, ending = "fixed", "fixed", "_fixed"
     chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
@@ -302,7 +300,6 @@ class Variant:
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
             "PLAIN_PLAYS": self.moves == "play", "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
-            "MOVES_APART": self.family.moves_apart and bent and self.moves in ("relaxing", "dilated"),
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 

@@ -1,26 +1,12 @@
 /* Operators of a model with effects: plays moved or bent by an effect. The state of play i is the
-   value at which the play would come to rest (`play`) and its contribution at this value (`bent`).
-   Called by chain.c and moving_search.c. */
+   value at which the play would come to rest (`play`). In floating point, its contribution there is
+   kept (`bent`). Called by chain.c and moving_search.c. */
 #ifndef HYSTGEN_CHAIN_MOVING_PLAYS_C
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
-
-#ifdef HYSTGEN_HAS_MOVES_APART
-/* Play i after the input of the plays has moved from x to w. Not inlined, to need less stack. */
-HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t x, hystgen_play_t w) {
-    return hystgen_moved(i, play, x, w);
-}
-#else
-/* Play i after the input of the plays has moved from x to w. */
-static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t x, hystgen_play_t w) {
-    return hystgen_moved(i, play, x, w);
-}
-#endif
 
 /* Play i at rest with its input at w. */
 static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
@@ -33,11 +19,11 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 #if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
 HYSTGEN_APART void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
                                 hystgen_play_t w) {
-    play[i] = hystgen_reached(i, play, x, w);
+    play[i] = hystgen_moved(i, play, x, w);
 }
 #else
 static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
-    play[i] = hystgen_reached(i, play, x, w);
+    play[i] = hystgen_moved(i, play, x, w);
 }
 #endif
 
@@ -47,132 +33,143 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 }
 #endif
 
-#if defined(HYSTGEN_HAS_BENT_PLAYS) && defined(HYSTGEN_FIXED)
-/* Takes the plays up to i out of the sum of those that stay. */
-static void hystgen_operator_released(hystgen_operator_t *self, unsigned int i) {
-    while (self->released < i) {
-        const unsigned int k = self->released + 1u;
-        self->staying -= hystgen_model_tables.weight[k] * hystgen_bent(k, self->play[k]);
-        self->released = k;
-    }
-}
-
-/* Play i after the input of the plays has moved to w, or at rest at w. */
-static inline hystgen_play_t hystgen_operator_reached(const hystgen_operator_t *self,
-                                                      unsigned int i, hystgen_play_t w) {
-    return self->moving ? hystgen_reached(i, self->play, self->play[0], w)
-                        : hystgen_resting(i, self->play, w);
-}
-
-/* Takes the plays up to the last one that leaves its place for w out of the sum. Plays that move
-   with their input alone leave in the order of their thresholds. */
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
+/* Plays that are bent but move with their input alone leave their places in the order of their
+   thresholds. The contributions of those that stay are kept as a sum (`staying`). Takes those that
+   leave for w out of it. */
 HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_play_t w) {
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = self->released + 1u; i <= HYSTGEN_N_PLAYS; ++i) {
-        if (hystgen_operator_reached(self, i, w) != self->play[i]) {
-            hystgen_operator_released(self, i);
-        }
-#ifdef HYSTGEN_HAS_PLAIN_PLAYS
-        else {
+        if (hystgen_resting(i, self->play, w) == self->play[i]) {
             break;
         }
-#endif
+        self->staying -= hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
+        self->released = i;
     }
 }
 
-/* Sum of the plays with their input at w, for which those that move are released. */
-HYSTGEN_APART hystgen_sum_t hystgen_operator_added(const hystgen_operator_t *self,
-                                                   hystgen_play_t w) {
+/* Sum of the plays after their input has moved to w, for which those that leave are released;
+   increases with w. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= self->released; ++i) {
-        const hystgen_play_t z = hystgen_operator_reached(self, i, w);
-        sum += hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+        sum += hystgen_model_tables.weight[i] *
+               hystgen_bent(i, hystgen_resting(i, self->play, w));
     }
     return sum;
-}
-
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-static inline hystgen_sum_t hystgen_operator_sum(hystgen_operator_t *self, hystgen_play_t w) {
-#ifdef HYSTGEN_INVERSE
-    if (self->search.known && self->search.input == w) {
-        return self->search.found;
-    }
-#endif
-    hystgen_operator_release(self, w);
-    return hystgen_operator_added(self, w);
 }
 
 /* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
 HYSTGEN_APART void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
     unsigned int i;
     self->staying = 0;
-    self->released = 0;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        hystgen_put(i, self->play, hystgen_resting(i, self->play, w));
+        self->play[i] = hystgen_resting(i, self->play, w);
         self->staying += hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
     }
     self->play[0] = w;
+    self->released = 0;
+    self->sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
+    self->level = hystgen_level(self->sum);
 #ifdef HYSTGEN_INVERSE
     self->search.rate = HYSTGEN_FASTEST;
-    self->search.known = false;
+    self->search.input = w;
+    self->search.found = self->sum;
 #endif
-    self->level =
-        hystgen_level((hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying);
 }
 
-/* The plays move while their input moves to w, at which their sum is `sum`. All of them stay again
-   once the last of those released does. */
-HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w,
-                                         hystgen_sum_t sum) {
-    const unsigned int last = self->released;
-    const hystgen_play_t before = self->play[last];
+/* The plays move while their input moves to w. All of them stay once the last one that has moved
+   does. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_play_t before = 0;
     unsigned int i;
     HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        hystgen_move(i, self->play, self->play[0], w);
+    for (i = 1; i <= self->released; ++i) {
+        before = self->play[i];
+        self->play[i] = hystgen_resting(i, self->play, w);
     }
     self->play[0] = w;
-    if (self->play[last] == before) {
-        self->staying = sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    if (self->play[self->released] == before) {
+        self->staying = self->sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
         self->released = 0;
     }
 }
 
-#ifdef HYSTGEN_HAS_RELAXING_PLAYS
-/* Updates the plays to their rest values with the input held, as of one step later. */
-HYSTGEN_APART void hystgen_operator_relax(hystgen_operator_t *self) {
+/* The plays follow their input w, which a search may just have tried. Updates their sum. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    if (!self->moving) {
+        hystgen_operator_settle_plays(self, w);
+        return;
+    }
+#ifdef HYSTGEN_INVERSE
+    if (w != self->search.input) {
+        hystgen_operator_release(self, w);
+        self->search.found = hystgen_operator_sum(self, w);
+        self->search.input = w;
+    }
+    self->sum = self->search.found;
+#else
+    hystgen_operator_release(self, w);
+    self->sum = hystgen_operator_sum(self, w);
+#endif
+    hystgen_operator_move(self, w);
+    self->level = hystgen_level(self->sum);
+}
+#elif defined(HYSTGEN_FIXED)
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    if (self->moving) {
+        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+            const hystgen_play_t z = hystgen_moved(i, self->play, self->play[0], w);
+            sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+        }
+        return sum;
+    }
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t z = hystgen_resting(i, self->play, w);
+        sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+    }
+    return sum;
+}
+
+/* The plays move while their input moves to w, or come to rest. Updates their sum. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w) {
+    const hystgen_play_t x = self->play[0];
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t rest = hystgen_relaxed(i, self->play);
-        if (rest != self->play[i]) {
-            hystgen_operator_released(self, i);
-            self->play[i] = rest;
+        if (self->moving) {
+            hystgen_move(i, self->play, x, w);
+        } else {
+            hystgen_put(i, self->play, hystgen_resting(i, self->play, w));
         }
+        sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
     }
+    self->play[0] = w;
+    self->level = hystgen_level(sum);
 }
+
+/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
+static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
+#ifdef HYSTGEN_INVERSE
+    self->search.rate = HYSTGEN_FASTEST;
 #endif
+    hystgen_operator_move(self, w);
+}
 
 /* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
-        const hystgen_sum_t sum = hystgen_operator_sum(self, w);
-        self->level = hystgen_level(sum);
-        hystgen_operator_move(self, w, sum);
-#ifdef HYSTGEN_HAS_RELAXING_PLAYS
-        hystgen_operator_relax(self);
-#endif
-#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
-        self->search.input = w; /* where the next search begins, with the same sum */
-        self->search.found = sum;
-        self->search.known = true;
-#elif defined(HYSTGEN_INVERSE)
-        self->search.known = false;
-#endif
+        hystgen_operator_move(self, w);
+        hystgen_relax(self->play, NULL);
     } else {
         hystgen_operator_settle_plays(self, w);
     }
@@ -257,12 +254,8 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
-/* The plays come to rest with their input at w, and a search in fixed point begins anew. Updates
-   their sum. */
+/* The plays come to rest with their input at w. Updates their sum. */
 static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
-#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
-    self->search.rate = HYSTGEN_FASTEST;
-#endif
     self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
 }
 
@@ -285,29 +278,8 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return self->level;
 }
 
-#ifdef HYSTGEN_INVERSE
-#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_BENT_PLAYS)
-/* The sum is that of both operators. */
-#elif defined(HYSTGEN_FIXED)
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    if (self->moving) {
-        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            sum = sum + (hystgen_sum_t)hystgen_model_tables.weight[i] *
-                            hystgen_reached(i, self->play, self->play[0], w);
-        }
-        return sum;
-    }
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        sum = sum + (hystgen_sum_t)hystgen_model_tables.weight[i] *
-                        hystgen_resting(i, self->play, w);
-    }
-    return sum;
-}
-#elif defined(HYSTGEN_HAS_BUMP)
+#if defined(HYSTGEN_INVERSE) && !defined(HYSTGEN_FIXED)
+#ifdef HYSTGEN_HAS_BUMP
 /* Play i with its input at that of the search. Sets the play's slope. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_tried(hystgen_inverse_t *self, unsigned int i) {
     const hystgen_real_t w = self->search.input;
@@ -330,7 +302,7 @@ HYSTGEN_APART void hystgen_inverse_add(hystgen_inverse_t *self, unsigned int i) 
 static hystgen_real_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_real_t w) {
     unsigned int i;
     self->search.left = hystgen_model_tables.weight[0] * w;
-    self->search.rate = HYSTGEN_FASTEST;
+    self->search.slope = hystgen_model_tables.weight[0];
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_inverse_add(self, i);

@@ -22,18 +22,18 @@ HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_
     self->search.short_of = 0;
     self->search.over = -1;
     self->search.sum = hystgen_asked(h);
+    self->search.tries = 0;
+    self->search.input = self->play[0];
     self->search.before = self->play[0];
-    if (self->search.input != self->play[0]) {
-        self->search.input = self->play[0];
-        self->search.known = false;
-    }
+#ifdef HYSTGEN_HAS_PLAIN_PLAYS
+    self->search.found = self->sum;
+#endif
 }
 
 /* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
    search is over. */
-HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t found) {
-    search->found = found;
-    search->known = true;
+HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
+    const hystgen_sum_t found = search->found;
     if (found < search->sum) {
         search->low = search->input;
         search->short_of = search->sum - found;
@@ -71,15 +71,15 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *sear
 
 /* Goes on to the next input: by the rate of a secant, if that leads inside the interval and has not
    been tried too often; else to the middle of the interval. */
-HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search, bool secant) {
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
     hystgen_sum_t next = search->input; /* an end of the interval */
-    if (secant) {
+    if (search->tries < HYSTGEN_SECANTS) {
+        ++search->tries;
         hystgen_inverse_turn(search);
         next = hystgen_inverse_further(search);
     }
     search->before = search->input;
     search->last = search->found;
-    search->known = false;
     if (next > search->low && next <= search->top) {
         search->input = (hystgen_play_t)next;
     } else {
@@ -91,13 +91,16 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search, bool secant
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
-    unsigned int tries = 0;
     hystgen_inverse_seek(self, h);
-    while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
-        hystgen_inverse_advance(&self->search, tries < HYSTGEN_SECANTS);
-        if (tries < HYSTGEN_SECANTS) {
-            ++tries;
-        }
+#ifndef HYSTGEN_HAS_PLAIN_PLAYS
+    self->search.found = hystgen_inverse_sum(self, self->search.input);
+#endif
+    while (!hystgen_inverse_over(&self->search)) {
+        hystgen_inverse_advance(&self->search);
+#ifdef HYSTGEN_HAS_PLAIN_PLAYS
+        hystgen_inverse_release(self, self->search.input);
+#endif
+        self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
     if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
         return self->search.input;

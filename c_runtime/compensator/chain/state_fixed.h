@@ -107,7 +107,7 @@ typedef struct {
     int32_t before;   /* and the one before */
     int32_t low;
     int32_t top;
-    bool known; /* the sum at the input has been found, and the plays have not moved since */
+    uint8_t tries; /* by secants */
 } hystgen_search_t;
 
 typedef struct {

@@ -87,10 +87,10 @@ static hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z, hystg
 }
 #endif
 
-/* Contribution of play i at z. Keeps it, if it is not z itself. */
+/* Contribution of play i at z. Keeps it in floating point, if it is not z itself. */
 static inline hystgen_sum_t hystgen_bent_anew(unsigned int i, hystgen_play_t z,
                                               hystgen_sum_t *bent) {
-#ifdef HYSTGEN_HAS_BENT_PLAYS
+#if defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_FIXED)
     bent[i] = hystgen_bent(i, z);
     return bent[i];
 #else

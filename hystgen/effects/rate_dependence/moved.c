@@ -31,19 +31,15 @@ static inline hystgen_real_t hystgen_tried(unsigned int i, const hystgen_real_t 
 }
 #endif
 
-/* Rest value of play i with the input held, as of one step later. */
-static hystgen_play_t hystgen_relaxed(unsigned int i, const hystgen_play_t *play) {
-    const hystgen_sum_t on =
-        hystgen_stretch((hystgen_sum_t)play[0] - play[i], hystgen_model_tables.threshold[i]);
-    return (hystgen_play_t)(play[i] + hystgen_share_of(on, &hystgen_kept[i]));
-}
-
-/* Updates the plays to their rest values. */
+/* Updates the plays to their rest values with the input held, as of one step later. */
 HYSTGEN_APART void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t rest = hystgen_relaxed(i, play);
+        const hystgen_sum_t on =
+            hystgen_stretch((hystgen_sum_t)play[0] - play[i], hystgen_model_tables.threshold[i]);
+        const hystgen_play_t rest =
+            (hystgen_play_t)(play[i] + hystgen_share_of(on, &hystgen_kept[i]));
         if (rest < play[i] || rest > play[i]) {
             play[i] = rest;
             (void)hystgen_bent_anew(i, rest, bent);
