@@ -221,7 +221,6 @@ class FixedForm(Form):
         return [
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
-            Field("signal_t", "sum", "of the plays"),
         ]
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:

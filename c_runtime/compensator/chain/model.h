@@ -140,7 +140,6 @@ typedef struct {
     hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
     hystgen_sum_t staying;
     unsigned int released;
-    hystgen_sum_t sum;
     hystgen_search_t search;
 #else
     bool sought;

@@ -62,29 +62,10 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     return sum;
 }
 
-/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
-HYSTGEN_APART void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
-    unsigned int i;
-    self->staying = 0;
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        self->play[i] = hystgen_resting(i, self->play, w);
-        self->staying += hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
-    }
-    self->play[0] = w;
-    self->released = 0;
-    self->sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
-    self->level = hystgen_level(self->sum);
-#ifdef HYSTGEN_INVERSE
-    self->search.rate = HYSTGEN_FASTEST;
-    self->search.input = w;
-    self->search.found = self->sum;
-#endif
-}
-
-/* The plays move while their input moves to w. All of them stay once the last one that has moved
-   does. */
-HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w) {
+/* The plays move while their input moves to w, where their sum is `sum`. All of them stay once the
+   last one that has moved does. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w,
+                                         hystgen_sum_t sum) {
     hystgen_play_t before = 0;
     unsigned int i;
     HYSTGEN_ROLLED
@@ -94,30 +75,31 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     }
     self->play[0] = w;
     if (self->play[self->released] == before) {
-        self->staying = self->sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+        self->staying = sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
         self->released = 0;
     }
+    self->level = hystgen_level(sum);
 }
 
-/* The plays follow their input w, which a search may just have tried. Updates their sum. */
+/* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
+   sum, unless a search has just found it. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (!self->moving) {
-        hystgen_operator_settle_plays(self, w);
-        return;
+        self->staying = 0;
+        self->released = HYSTGEN_N_PLAYS;
     }
 #ifdef HYSTGEN_INVERSE
-    if (w != self->search.input) {
+    if (!self->moving || w != self->search.input) {
         hystgen_operator_release(self, w);
-        self->search.found = hystgen_operator_sum(self, w);
         self->search.input = w;
+        self->search.found = hystgen_operator_sum(self, w);
     }
-    self->sum = self->search.found;
+    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
+    hystgen_operator_move(self, w, self->search.found);
 #else
     hystgen_operator_release(self, w);
-    self->sum = hystgen_operator_sum(self, w);
+    hystgen_operator_move(self, w, hystgen_operator_sum(self, w));
 #endif
-    hystgen_operator_move(self, w);
-    self->level = hystgen_level(self->sum);
 }
 #elif defined(HYSTGEN_FIXED)
 /* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
@@ -157,21 +139,15 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     self->level = hystgen_level(sum);
 }
 
-/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
-static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
+/* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
+   sum. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
 #ifdef HYSTGEN_INVERSE
-    self->search.rate = HYSTGEN_FASTEST;
+    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
 #endif
     hystgen_operator_move(self, w);
-}
-
-/* The plays follow their input w. Updates their sum. */
-static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
-        hystgen_operator_move(self, w);
         hystgen_relax(self->play, NULL);
-    } else {
-        hystgen_operator_settle_plays(self, w);
     }
 }
 #else
@@ -254,27 +230,21 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
-/* The plays come to rest with their input at w. Updates their sum. */
-static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
-    self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
-}
-
-/* The plays follow their input w. Updates their sum. */
+/* The plays follow their input w, or come to rest there. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t *bent = hystgen_operator_bent(self);
     if (self->moving) {
-        hystgen_sum_t *bent = hystgen_operator_bent(self);
         self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
         hystgen_relax(self->play, bent);
     } else {
-        hystgen_operator_settle_plays(self, w);
+        self->level = hystgen_level(hystgen_moved_rest(self->play, bent, w));
     }
 }
-
 #endif
 
-/* Sum of the plays in the start memory. */
+/* Sum of the plays in the start memory, at rest. */
 static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
-    hystgen_operator_settle_plays(self, self->play[0]);
+    hystgen_operator_follow(self, self->play[0]);
     return self->level;
 }
 

@@ -25,9 +25,6 @@ HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_
     self->search.tries = 0;
     self->search.input = self->play[0];
     self->search.before = self->play[0];
-#ifdef HYSTGEN_HAS_PLAIN_PLAYS
-    self->search.found = self->sum;
-#endif
 }
 
 /* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
@@ -56,17 +53,17 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
 
 /* The input to which the rate leads from the one tried last, at least one on and not beyond all. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
-    const bool rising = search->found < search->sum;
     const hystgen_sum_t input = search->input;
-    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
-    const uint64_t left = (uint64_t)hystgen_size(search->found - search->sum);
-    const uint64_t steps = hystgen_wide((uint32_t)(left >> HYSTGEN_WORD), search->rate) +
-                           (hystgen_wide((uint32_t)left, search->rate) >> HYSTGEN_WORD);
-    const hystgen_sum_t way =
+    const hystgen_sum_t left = search->sum - search->found;
+    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (left > 0 ? input : -input);
+    const uint64_t size = (uint64_t)hystgen_size(left);
+    const uint64_t steps = hystgen_wide((uint32_t)(size >> HYSTGEN_WORD), search->rate) +
+                           (hystgen_wide((uint32_t)size, search->rate) >> HYSTGEN_WORD);
+    const hystgen_sum_t on =
         (hystgen_sum_t)((steps + HYSTGEN_HALF_RATE) >> (HYSTGEN_RATE_BITS - HYSTGEN_WORD));
-    const hystgen_sum_t some = way > 1 ? way : 1;
+    const hystgen_sum_t some = on > 1 ? on : 1;
     const hystgen_sum_t inside = some > room ? room : some;
-    return rising ? input + inside : input - inside;
+    return left > 0 ? input + inside : input - inside;
 }
 
 /* Goes on to the next input: by the rate of a secant, if that leads inside the interval and has not
@@ -78,14 +75,12 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
         hystgen_inverse_turn(search);
         next = hystgen_inverse_further(search);
     }
+    if (next <= search->low || next > search->top) {
+        next = search->low + ((hystgen_sum_t)search->top - search->low + 1) / 2;
+    }
     search->before = search->input;
     search->last = search->found;
-    if (next > search->low && next <= search->top) {
-        search->input = (hystgen_play_t)next;
-    } else {
-        const hystgen_sum_t size = (hystgen_sum_t)search->top - search->low + 1;
-        search->input = (hystgen_play_t)(search->low + size / 2);
-    }
+    search->input = (hystgen_play_t)next;
 }
 
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
@@ -94,7 +89,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     hystgen_inverse_seek(self, h);
 #ifndef HYSTGEN_HAS_PLAIN_PLAYS
     self->search.found = hystgen_inverse_sum(self, self->search.input);
-#endif
+#endif /* they have just followed an input, at which their sum is known */
     while (!hystgen_inverse_over(&self->search)) {
         hystgen_inverse_advance(&self->search);
 #ifdef HYSTGEN_HAS_PLAIN_PLAYS
