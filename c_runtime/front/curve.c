@@ -13,8 +13,7 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
-   coefficients from degree 0. All but c_0 fit a word together, so that products are those of words.
- */
+   coefficients from degree 0, of which all but c_0 fit a word together. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {

@@ -19,13 +19,11 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 #if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
 HYSTGEN_APART void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
                                 hystgen_play_t w) {
-    play[i] = hystgen_moved(i, play, x, w);
-}
 #else
 static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
+#endif
     play[i] = hystgen_moved(i, play, x, w);
 }
-#endif
 
 /* Play i rests at z. */
 static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
@@ -94,7 +92,7 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);
     }
-    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
+    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
     hystgen_operator_move(self, w, self->search.found);
 #else
     hystgen_operator_release(self, w);
@@ -143,12 +141,14 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
 #ifdef HYSTGEN_INVERSE
-    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
+    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
 #endif
     hystgen_operator_move(self, w);
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
     if (self->moving) {
         hystgen_relax(self->play, NULL);
     }
+#endif
 }
 #else
 #ifdef HYSTGEN_HAS_BENT_PLAYS
@@ -235,7 +235,9 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
     hystgen_sum_t *bent = hystgen_operator_bent(self);
     if (self->moving) {
         self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
+#endif
     } else {
         self->level = hystgen_level(hystgen_moved_rest(self->play, bent, w));
     }

@@ -15,18 +15,6 @@ static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
     return x < 0 ? -x : x;
 }
 
-/* Begins a search for the sum h at the present input. */
-HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_t h) {
-    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
-    self->search.top = HYSTGEN_LARGEST_INPUT;
-    self->search.short_of = 0;
-    self->search.over = -1;
-    self->search.sum = hystgen_asked(h);
-    self->search.tries = 0;
-    self->search.input = self->play[0];
-    self->search.before = self->play[0];
-}
-
 /* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
    search is over. */
 HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
@@ -47,7 +35,7 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
     if (way >= HYSTGEN_SECANT) {
         const hystgen_sum_t gained = hystgen_size(search->found - search->last);
         const hystgen_sum_t rate = hystgen_quotient(way, gained > 1 ? gained : 1, HYSTGEN_RATE_BITS);
-        search->rate = (uint32_t)(rate < 1 ? 1 : rate > HYSTGEN_FASTEST ? HYSTGEN_FASTEST : rate);
+        search->rate = (uint32_t)(rate < 1 ? 1 : rate > INT32_MAX ? INT32_MAX : rate);
     }
 }
 
@@ -60,7 +48,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *sear
     const uint64_t steps = hystgen_wide((uint32_t)(size >> HYSTGEN_WORD), search->rate) +
                            (hystgen_wide((uint32_t)size, search->rate) >> HYSTGEN_WORD);
     const hystgen_sum_t on =
-        (hystgen_sum_t)((steps + HYSTGEN_HALF_RATE) >> (HYSTGEN_RATE_BITS - HYSTGEN_WORD));
+        (hystgen_sum_t)((steps + (((uint64_t)1 << (HYSTGEN_RATE_BITS - HYSTGEN_WORD)) >> 1)) >> (HYSTGEN_RATE_BITS - HYSTGEN_WORD));
     const hystgen_sum_t some = on > 1 ? on : 1;
     const hystgen_sum_t inside = some > room ? room : some;
     return left > 0 ? input + inside : input - inside;
@@ -86,7 +74,14 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
-    hystgen_inverse_seek(self, h);
+    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
+    self->search.top = HYSTGEN_LARGEST_INPUT;
+    self->search.short_of = 0;
+    self->search.over = -1;
+    self->search.sum = hystgen_asked(h);
+    self->search.tries = 0;
+    self->search.input = self->play[0];
+    self->search.before = self->play[0];
 #ifndef HYSTGEN_HAS_PLAIN_PLAYS
     self->search.found = hystgen_inverse_sum(self, self->search.input);
 #endif /* they have just followed an input, at which their sum is known */

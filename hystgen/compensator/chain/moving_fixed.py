@@ -25,21 +25,8 @@ def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
     room = m.farthest - w if left > 0 else m.farthest + w
     more = size(left)
     step = (more >> 32) * rate + (((more & 0xFFFFFFFF) * rate) >> 32)
-    step = (step + ((1 << (m.rate_bits - 32)) >> 1)) >> (m.rate_bits - 32)
-    if step < 1:
-        step = step + 1
-    if step > room:
-        step = room
+    step = min(max((step + ((1 << (m.rate_bits - 32)) >> 1)) >> (m.rate_bits - 32), 1), room)
     return w + step if left > 0 else w - step
-
-
-@jit
-def secant(m: FixedMovingTables, way: int, gained: int) -> int:
-    """The rate of a sum that changed by `gained` over `way`, no less than 1 nor more than at the least slope."""
-    rate = quotient(way, gained if gained > 0 else gained + 1, m.rate_bits)
-    if rate < 1:
-        return rate + 1
-    return rate if rate < FASTEST else FASTEST
 
 
 def search(sum_at: Callable[..., int], _: object) -> Answer:
@@ -74,7 +61,7 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
                 return high if short > over else low
             way = size(w - before)
             if tries < SECANTS and way >= SECANT:
-                s.bent[0] = secant(m, way, size(total - last))
+                s.bent[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
             before = w
             last = total
             if tries < SECANTS:

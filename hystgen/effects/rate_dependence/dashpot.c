@@ -50,12 +50,6 @@ static inline hystgen_real_t hystgen_tried(unsigned int i, const hystgen_real_t 
 }
 #endif
 
-/* The present values of the plays are their rest values: plays creep on only in the next steps. */
-static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
-    (void)play;
-    (void)bent;
-}
-
 /* Play i moves while the input of the plays moves from x to w. */
 HYSTGEN_APART_IN_FLOAT void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
                                          hystgen_play_t w) {

@@ -89,12 +89,6 @@ static inline hystgen_real_t hystgen_tried(unsigned int i, const hystgen_real_t 
     return play[i];
 }
 #endif
-
-/* The present values of the plays are their rest values. */
-static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
-    (void)play;
-    (void)bent;
-}
 #endif
 
 #endif
