@@ -177,7 +177,7 @@ STATES = [
     (r"(            NAME_move\(i, self->play, x, w\);\n)", r"\1            WITHIN(self->play[i], PLAY);\n"),
     (r"(        self->staying (?:-=|= sum -) [^;]*;\n)", r"\1        WITHIN(self->staying, PLAYS);\n"),
     (r"(    NAME_sum_t sum = [^;]* self->staying;\n)", r"\1    WITHIN(sum, PLAYS);\n"),
-    (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\(i, self->play, w\)\);\n)", r"\1        WITHIN(sum, PLAYS);\n"),
+    (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\([^;]*;\n)", r"\1        WITHIN(sum, PLAYS);\n"),
     (r"(    const NAME_bump_t \*c = &NAME_bump\[)(NAME_bump_of\[i\])(\];\n)",  # curve by curve
      r"    const unsigned int which = \2;\n    /*@ split which; */\n\1which\3"),
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),

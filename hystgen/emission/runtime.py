@@ -298,8 +298,9 @@ class Variant:
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
-            "PLAIN_PLAYS": self.moves == "play", "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
-            "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
+            "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
+            "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
+            "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 

@@ -104,7 +104,11 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+#ifdef HYSTGEN_HAS_DILATED_PLAYS
+    if (self->moving && w != self->play[0]) { /* thresholds do not grow with no move */
+#else
     if (self->moving) {
+#endif
         for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
             const hystgen_play_t z = hystgen_moved(i, self->play, self->play[0], w);
             sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, z);

@@ -29,10 +29,10 @@ HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
     return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
 }
 
-/* Updates the rate to that of the secant through the last two inputs, if they are far apart. */
+/* Updates the rate to that of the secant through the last two inputs, once there are two. */
 HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
     const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->before);
-    if (way >= HYSTGEN_SECANT) {
+    if (way > 0) {
         const hystgen_sum_t gained = hystgen_size(search->found - search->last);
         const hystgen_sum_t rate = hystgen_quotient(way, gained > 1 ? gained : 1, HYSTGEN_RATE_BITS);
         search->rate = (uint32_t)(rate < 1 ? 1 : rate > INT32_MAX ? INT32_MAX : rate);

@@ -9,7 +9,7 @@ from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import FASTEST, SECANT, SECANTS, FixedMovingTables
+from hystgen.effects.plays import FASTEST, SECANTS, FixedMovingTables
 from hystgen.plays.fixed import loop_solve, nearest, quotient
 
 
@@ -60,7 +60,7 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
             if high - low == 1:
                 return high if short > over else low
             way = size(w - before)
-            if tries < SECANTS and way >= SECANT:
+            if tries < SECANTS and way > 0:
                 s.bent[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
             before = w
             last = total
