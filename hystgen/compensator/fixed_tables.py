@@ -621,11 +621,6 @@ class _Piece:
     scale: int
     coefficients: tuple[int, ...]
 
-    @property
-    def fits(self) -> bool:
-        """Whether all coefficients but the first, and what rounding adds to them, fit a word together."""
-        return sum(map(abs, self.coefficients[1:])) + len(self.coefficients) <= TABLE_MAX
-
 
 class FixedCurve:
     """A function of integers as a piecewise polynomial; `error`: largest difference between it and the function.
@@ -651,7 +646,7 @@ class FixedCurve:
         while todo:
             a, b = todo.pop()
             piece, miss = self._fit(a, b, allowed)
-            if b - a > 1 and (miss > allowed or not piece.fits):
+            if b - a > 1 and (miss > allowed or sum(map(abs, piece.coefficients[1:])) + degree > TABLE_MAX):
                 if len(self.pieces) + len(todo) > MOST_PIECES:
                     message = "bends too sharply for fixed point over input_range; narrow the range or use float32"
                     raise FormatError((("model", "memoryless"), message))

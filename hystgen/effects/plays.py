@@ -37,7 +37,7 @@ enough on smooth references, and 5 after jumps."""
 
 SECANTS = 10
 """Tries of a search in fixed point by secants, before it halves what is left of its interval. Set by:
-benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8 some jumps take 25."""
+benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8, some take 25."""
 
 FASTEST = 2**31 - 1
 """Largest rate: product with a word fits 63 bits."""

@@ -285,7 +285,11 @@ def instance(
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *(t.form.contributions(plays) if bent else ()),
+        *[
+            Field("signal_t", "bent", "contribution of each play", plays + 1),
+            Field("signal_t", "staying", "sum of the plays that have not moved lately"),
+            Field("unsigned int", "released", "the last of the plays that have"),
+        ] * bent,
         *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
     ]
 

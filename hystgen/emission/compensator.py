@@ -255,10 +255,6 @@ class Form(ABC):
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         """The memory of engine corners' plays in a model with effects."""
 
-    def contributions(self, plays: int) -> list[Field]:
-        """What an instance knows of the contributions of bent plays."""
-        return [Field("signal_t", "bent", "contribution of each play", plays + 1)]
-
     def effects(self, t: ChainTables) -> list[Macro]:
         """Macros that a model with effects needs only in fixed point."""
         return []

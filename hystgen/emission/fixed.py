@@ -214,12 +214,6 @@ class FixedForm(Form):
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
         return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
 
-    def contributions(self, plays: int) -> list[Field]:
-        return [
-            Field("signal_t", "staying", "sum of the plays that have not moved lately"),
-            Field("unsigned int", "released", "the last of the plays that have"),
-        ]
-
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [
             Field("place_t", "here"),

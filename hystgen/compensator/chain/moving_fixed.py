@@ -82,12 +82,8 @@ def level(t: FixedChainTables, total: int) -> int:
 @jit
 def asked(t: FixedChainTables, h: int) -> int:
     """The sum of the plays that a signal asks for, limited to their range."""
-    inside = h
-    if inside > t.number.largest_level[0]:
-        inside = t.number.largest_level[0]
-    elif inside < -t.number.largest_level[0]:
-        inside = -t.number.largest_level[0]
-    return inside << t.number.level_drop[0]
+    most = t.number.largest_level[0]
+    return min(max(h, -most), most) << t.number.level_drop[0]
 
 
 PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search))

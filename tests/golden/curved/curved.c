@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 b877802751aabc493b414f6b9a6bb9e30a23d387350249be51fb4a4b83e6c419, without this line
+ * Text: sha256 ed9fd0c744bb643f94efcc96392437adb5f85614c4ea3430ed954dc0c80cd401, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -317,8 +317,7 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
-   coefficients from degree 0. All but c_0 fit a word together, so that products are those of words.
- */
+   coefficients from degree 0, of which all but c_0 fit a word together. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
         unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
