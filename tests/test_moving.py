@@ -208,7 +208,7 @@ def test_thresholds_by_rate_are_solved_for_right_up_to_their_kinks(
 
 # ---------------------------------------------------------------- plays in fixed point, by their definition
 
-PI = "\n  pi: {thresholds: [0, 1, 1.5, 2.5, 4, 5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
+PI = "\n  pi: {thresholds: [0, 0.5, 1, 1.5, 2.5, 3.5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
 FIXED = {
     "dilated": f"name: rate_dependence, betas: [{', '.join(map(str, BETAS))}]",
     "polynomials": "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05, 0.02]]",
@@ -286,7 +286,7 @@ def test_inputs_in_fixed_point_are_the_nearest_of_all(effect: str, arithmetic: s
             near = [*range(w - 4, w + 5), *(w + side * 2**b for b in range(3, 20, 2) for side in (1, -1))]
             anywhere = [x for x in (*near, *rng.integers(-far, far, 60).tolist()) if abs(x) <= far]
             assert all(abs(exact.total(x) - (h << drop)) >= left or left <= int(t.moving.near) for x in anywhere)
-            applied = w if k % 5 else int(rng.integers(-far // 3, far // 3))
+            applied = min(max(w, -far // 3), far // 3) if k % 5 else int(rng.integers(-far // 3, far // 3))
             level, total, places = int(follow(t, s, applied)), exact.total(applied), exact.places(applied)
             assert level == away(Fraction(total, 2**drop))
             assert [int(x) for x in s.plays.play] == places
