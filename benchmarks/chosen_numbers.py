@@ -1,7 +1,7 @@
 """Runs behind chosen numbers that no test of a model can set: what another value would cost or spoil.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples] [tries]
+        [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples] [tries] [secants]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.gains.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
@@ -9,7 +9,8 @@ lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.gains.MOST_CHANGE`; d
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
 `compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`; noisy: `model.MOST_GAIN` and
 `emission.doubts.NOISY`; fast: `emission.doubts.FAST`; samples: `compensator.chain.measured.SAMPLES`; tries:
-`effects.plays.NEWTON_TRIES`. Each takes some seconds, shifts a minute; random numbers have fixed seeds.
+`effects.plays.NEWTON_TRIES`; secants: `effects.plays.SECANTS`. Each takes some seconds, shifts a minute; random numbers
+have fixed seeds.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ from hystgen import plants
 from hystgen.basics import jit
 from hystgen.chain import chain
 from hystgen.compensator import reference
-from hystgen.compensator.chain import layout, measured, moving, moving_float, noise, preview, tables
+from hystgen.compensator.chain import layout, measured, moving, moving_fixed, moving_float, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
+from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.run import answers as reference_answers
 from hystgen.compensator.chained import STANDARD
 from hystgen.diagnosis.data import signals
@@ -65,6 +67,14 @@ EFFECTS = (
     "name: resonance, frequency: 120, damping: 0.02",
     "name: ageing, shape: logarithmic, loss: 0.01, travel: 1.0e4",
     "name: slew_limit, rate: 2000",
+)
+
+
+MOVING_PLAYS = (
+    "name: rate_dependence, betas: [1.0e-4, 2.0e-4]",
+    "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2",
+    "name: noncongruent, coefficients: [[0.02, 0.01], [0.02, 0.05]]",
+    "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 0.8",
 )
 
 
@@ -447,6 +457,43 @@ def tries() -> None:
             print("      ", *found, f" {name}, {effect.partition(', ')[2]}")
 
 
+def secants() -> None:
+    """Inputs that a search in fixed point tries, on average and at most, with up to so many by secants."""
+    moved, bent = MOVES.coded().moved, BENDS.coded().bent
+    values = (2, 4, 6, 8, 10, 12, 20)
+    print("secants:", *(f"{each:10}" for each in values))
+    for effect, arithmetic in itertools.product(MOVING_PLAYS, ("q31", "q15")):
+        model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effect), "stage_x.yaml"))
+        t: Any = model.tables(arithmetic, "loop")
+        tried: list[int] = []
+
+        def sum_at(t: Any, s: Any, w: int, tried: list[int] = tried) -> int:
+            tried[-1] += 1
+            m, p, r = t.moving, t.plays.weight, t.plays.threshold
+            z = [moved(m, r, i, s.plays, s.lost, w) for i in range(1, len(r))]
+            return int(p[0] * w + sum(p[i] * bent(m, t.plays, i, each) for i, each in enumerate(z, 1)))
+
+        rng, k = np.random.default_rng(3), np.arange(150)
+        jumps = rng.uniform(-1, 1, 150)
+        signals = {
+            "sine": np.sin(0.05 * k), "creeping": 1e-7 * np.sin(0.05 * k) + 0.2, "jumps": jumps,
+            "both": np.where(k % 10 < 9, 1e-6 * k, jumps),
+        }  # fmt: skip
+        for signal, levels in signals.items():
+            found = []
+            for value in values:
+                with mock.patch.object(moving_fixed, "SECANTS", value), jit.plain():
+                    search, s = moving_fixed.search(sum_at, None), reference.new_state(t, True)
+                    reference.operations(t, True).init(t, s)
+                    s.own.moving[0] = 1
+                    tried.clear()
+                    for h in np.rint(0.25 * float(t.number.largest_level[0]) * levels).astype(np.int64).tolist():
+                        tried.append(0)
+                        moving_fixed.PLAYS[1](t, s, search(t, s, h << int(t.number.level_drop[0])))
+                found.append(f"{np.mean(tried):6.2f} {max(tried):3}")
+            print("         ", *found, f" {signal}, {arithmetic}, {effect.partition(' ')[2]}")
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms deviation of a frequency response from 1, in %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
@@ -456,7 +503,7 @@ RUNS: dict[str, Callable[[], None]] = {
     each.__name__: each
     for each in (
         lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches, noisy, fast,
-        samples, tries,
+        samples, tries, secants,
     )
 }
 

@@ -9,7 +9,7 @@
 
 #ifdef HYSTGEN_FIXED
 uint64_t hystgen_wide(uint32_t a, uint32_t b);
-int64_t hystgen_quotient(int64_t x, int64_t y);
+int64_t hystgen_quotient(int64_t x, int64_t y, unsigned int bits);
 int64_t hystgen_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift);
 int64_t hystgen_nearest(int64_t x, unsigned int bits);
 int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,

@@ -118,6 +118,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # MOVED    the drive asked of a lag in front of two branches moves at most from one end of the drives to the other
 # COARSE   numbers in the search for a lead are limited to this, and the search begins with a size and a lead above it
 # LOST     remainder of rounding to whole numbers
+# PLAYS    the format has room for the sum of all plays, and the sum of those that stay is a part of it
 # REST     remainder of rounding a rate-limited drive to a code, at most half a code
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
@@ -173,11 +174,14 @@ STATES = [
     (r"(    return \(NAME_play_t\)rest;\n)", r"    WITHIN(rest, PLAY);\n\1"),
     (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
     (r"(void NAME_put\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
-    (r"(        NAME_move\(i, play, \*from, w\);\n)", r"\1        WITHIN(play[i], PLAY);\n"),
+    (r"(            \(void\)NAME_move\(i, self->play, x, w\);\n)", r"\1            WITHIN(self->play[i], PLAY);\n"),
+    (r"(        self->staying (?:-=|= sum -) [^;]*;\n)", r"\1        WITHIN(self->staying, PLAYS);\n"),
+    (r"(    NAME_sum_t sum = [^;]* self->staying;\n)", r"\1    WITHIN(sum, PLAYS);\n"),
+    (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\([^;]*;\n)", r"\1        WITHIN(sum, PLAYS);\n"),
+    (r"(    const NAME_bump_t \*c = &NAME_bump\[)(NAME_bump_of\[i\])(\];\n)",  # curve by curve
+     r"    const unsigned int which = \2;\n    /*@ split which; */\n\1which\3"),
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
-    (r"        search->input = \(NAME_play_t\)\((search->low [^;]*)\);\n",
-     r"        const int64_t between = \1;\n        WITHIN(between, INPUT);\n"
-     r"        search->input = (NAME_play_t)between;\n"),
+    (r"(        next = search->low \+ [^;]*;\n)", r"\1        WITHIN(next, INPUT);\n"),
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # not facts: where Eva should stop widening, and what it should analyse case by case
@@ -218,7 +222,8 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
         "RUBBED": rubbed, "AMOUNT": 2 * rubbed * FRICTION_PLAYS**2,
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
-        "REST": 2**29, "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
+        "PLAYS": (int(t.number.largest_level[0]) + 1) << int(t.number.level_drop[0]), "REST": 2**29,
+        "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
     }  # fmt: skip
     if wrong:
         numbers[wrong] //= 64

@@ -232,7 +232,7 @@ def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monk
     all its tries, so its steps are set to 0 here."""
     reciprocal = moving_float.inverse
     monkeypatch.setattr(moving_float, "inverse", lambda t, slope: reciprocal(t, slope) * 0)
-    monkeypatch.setattr(moving_fixed, "quotient", lambda x, y: fixed.quotient(x, y) * 0)
+    monkeypatch.setattr(moving_fixed, "quotient", lambda x, y, bits: (found := fixed.quotient(x, y, bits)) - found)
     for module, kernel, of in ((envelopes, "tanh", math.tanh), (envelopes, "atanh", math.atanh),
                                (bends, "tanh", math.tanh)):  # fmt: skip
         monkeypatch.setattr(module, kernel, lambda x, _, of=of: Number(of(float(x))))

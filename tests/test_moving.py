@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
@@ -19,6 +20,7 @@ from hystgen.compensator.chain import moving, moving_fixed, moving_float
 from hystgen.effects.plays import (
     DASHPOT,
     DILATED,
+    FASTEST,
     INVERSE_SCALE,
     LARGEST_INPUT,
     LEAST_INPUT,
@@ -33,6 +35,8 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
 
 FARTHEST = 2**31 - 1
+RATE_BITS = 40
+"""Of a sum that rises by 2^9 or more a step."""
 
 
 def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
@@ -59,8 +63,8 @@ def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: 
         tries[0] += state is s
         return total(w)
 
-    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near))
-    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[slope])
+    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near, rate_bits=RATE_BITS))
+    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[min(max(2**RATE_BITS // slope, 1), FASTEST)])
     with jit.plain():
         answer = moving_fixed.search(sum_at, None)(t, s, h)
     return int(answer), tries[0]
@@ -112,13 +116,14 @@ def test_quotients_are_exact_to_a_part_in_2_28() -> None:
     rng = np.random.default_rng(1)
     for _ in range(3000):
         x, y = (int(2.0 ** rng.uniform(0.0, 61.9)) for _ in range(2))
-        exact = Fraction(x, y)
-        found = int(fixed.quotient.py_func(x, y))
+        bits = int(rng.integers(0, 63))
+        exact = Fraction(x, y) * 2**bits
+        found = int(fixed.quotient.py_func(x, y, bits))
         if exact < 2**60:
             assert abs(found - exact) <= Fraction(1, 2) + Fraction(1, 2**20) + exact / 2**28
         else:
             assert found >= 2**59
-    assert fixed.quotient.py_func(0, 5) == 0
+    assert fixed.quotient.py_func(0, 5, 3) == 0
 
 
 # ---------------------------------------------------------------- plays by rate or bent, in floating point
@@ -243,3 +248,91 @@ def test_plays_are_solved_for_right_up_to_their_kinks(
                         assert error <= left / Fraction(least)
                         assert error <= Fraction(16 * unit * 12), (k, float(error))
     assert most <= NEWTON_TRIES
+
+
+# ---------------------------------------------------------------- plays in fixed point, by their definition
+
+FIXED_PI = "\n  pi: {thresholds: [0, 0.5, 1, 1.5, 2.5, 3.5], weights: [0.5, 0.3, 0.2, 0.1, 0.3, 0.2]}\n"
+FIXED = {
+    "dilated": KINDS["dilated"],
+    "polynomials": "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05, 0.02]]",
+    "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 0.8",
+    "both": "name: rate_dependence, betas: [1.0e-4, 0, 1.0e-4, 2.0e-4, 0]}, "
+    "{name: noncongruent, shape: centre, amplitude: 0.3, centre: -1, width: 2",
+}
+
+
+def halved(x: Fraction) -> int:
+    """The nearest whole number, the larger one of two."""
+    return math.floor(x + Fraction(1, 2))
+
+
+def away(x: Fraction) -> int:
+    """The nearest whole number, that farther from 0 of two."""
+    return halved(x) if x > 0 else -halved(-x)
+
+
+class Whole:
+    """Plays in whole numbers, from the tables alone: what each contributes with their input anywhere."""
+
+    def __init__(self, t: Any, s: Any) -> None:
+        self.t, self.play = t, [int(x) for x in s.plays.play]
+        self.r, self.p = ([int(x) for x in row] for row in (t.plays.threshold, t.plays.weight))
+
+    def places(self, w: int) -> list[int]:
+        """Where the plays are once their input has moved to w."""
+        found = [w]
+        for r, (mantissa, shift), q in list(zip(self.r, self.t.moving.first.tolist(), self.play, strict=True))[1:]:
+            wide = r + halved(Fraction(abs(w - self.play[0]) * mantissa, 2**shift))
+            found.append(max(w - wide, min(q, w + wide)))
+        return found
+
+    def bent(self, i: int, z: int) -> int:
+        """What play i contributes at z."""
+        bump = self.t.moving.bump
+        if not len(bump.pieces):
+            return z
+        k = int(self.t.moving.bump_of[i])
+        x = max(int(bump.domain[k, 0]), min(z, int(bump.domain[k, 1])))
+        begins = bump.knot.tolist()[int(bump.first[k]) : int(bump.first[k] + bump.pieces[k])]
+        j = max(j for j, begin in enumerate(begins) if begin <= x)
+        row, value = int(bump.first[k]) + j, Fraction(0)
+        for c in reversed(bump.coefficient[row].tolist()):
+            value = Fraction(c + halved(value * (x - begins[j]) * Fraction(2) ** (int(bump.scale[row]) - 31)))
+        return z + away(value * 2 ** int(bump.scaled[k, 1]) / 2**self.t.moving.bump_bits)
+
+    def total(self, w: int) -> int:
+        places = self.places(w)
+        return self.p[0] * w + sum(self.p[i] * self.bent(i, places[i]) for i in range(1, len(self.p)))
+
+
+@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+@pytest.mark.parametrize("effect", FIXED)
+def test_inputs_in_fixed_point_are_the_nearest_of_all(effect: str, arithmetic: str) -> None:
+    """No input near the answer, nor at any of 60 places all over the range, has a sum nearer to that asked for; and
+    the sum of plays that have followed an input is that of their contributions, wherever drives have left them."""
+    text = f"{head('m')}{FIXED_PI}  effects: [{{{FIXED[effect]}}}]\nsample_time: 1.0e-3\n"
+    t = Model(parse_parameters(text, "m.yaml")).tables(arithmetic, "loop")
+    code, s = reference.operations(t, True), reference.new_state(t, True)
+    drop, far, rng = int(t.number.level_drop[0]), int(t.moving.farthest), np.random.default_rng(7)
+    _, follow, _, find = moving_fixed.PLAYS
+    turns = 0
+    with jit.plain():
+        code.init(t, s)
+        s.own.moving[0] = 1
+        at = 0.0
+        for k in range(48):
+            at = float(rng.uniform(-0.3, 0.3)) if k % 6 == 0 else at + float(rng.normal(0.0, 0.1 if k % 4 else 1e-5))
+            exact = Whole(t, s)
+            h = halved(Fraction(at) * int(t.number.largest_level[0]))
+            w = int(find(t, s, h))
+            left = abs(exact.total(w) - (h << drop))
+            near = [*range(w - 4, w + 5), *(w + side * 2**b for b in range(3, 20, 2) for side in (1, -1))]
+            anywhere = [x for x in (*near, *rng.integers(-far, far, 60).tolist()) if abs(x) <= far]
+            assert all(abs(exact.total(x) - (h << drop)) >= left or left <= int(t.moving.near) for x in anywhere)
+            applied = min(max(w, -far // 3), far // 3) if k % 5 else int(rng.integers(-far // 3, far // 3))
+            level, total, places = int(follow(t, s, applied)), exact.total(applied), exact.places(applied)
+            assert level == away(Fraction(total, 2**drop))
+            assert [int(x) for x in s.plays.play] == places
+            turns += places[1:] != exact.play[1:]
+    assert turns > 12

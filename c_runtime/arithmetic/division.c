@@ -45,10 +45,10 @@ static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
     return raised;
 }
 
-/* x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no less than
-   2^60 beyond that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17 y, a 17th off, and
+/* 2^bits x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no
+   less than 2^59 where it is above that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17 y, a 17th off, and
    each step squares that share. */
-HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y) {
+HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y, unsigned int bits) {
     uint32_t number;
     uint32_t divisor;
     if (x == 0) {
@@ -62,7 +62,7 @@ HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y) {
         const uint32_t off = 0x80000000u - hystgen_low_31(hystgen_wide(divisor, rate) >> 31);
         rate = (uint32_t)(hystgen_wide(rate, off) >> 30);
     }
-    const int shift = 60 + raised - lifted;
+    const int shift = 60 + raised - lifted - (int)bits;
     if (shift > 62) {
         return 0;
     }

@@ -13,14 +13,12 @@ static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f) {
     const int32_t low = (int32_t)(x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1));
     const int64_t whole =
         (int64_t)high * f->mantissa + (((int64_t)low * f->mantissa) >> HYSTGEN_LOW_PART);
-    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
-    return (whole + ((int64_t)1 << (shift - 1u))) >> shift;
+    return ((whole >> (f->shift - HYSTGEN_LOW_PART - 1u)) + 1) >> 1;
 }
 
 /* The same for |x| < 2^32, whose product with a mantissa fits 64 bits. */
 static int64_t hystgen_short_times(int64_t x, const hystgen_factor_t *f) {
-    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
-    return (((x * f->mantissa) >> HYSTGEN_LOW_PART) + ((int64_t)1 << (shift - 1u))) >> shift;
+    return (((x * f->mantissa) >> (f->shift - 1u)) + 1) >> 1;
 }
 #else
 /* x times a factor. */

@@ -13,15 +13,12 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
-   coefficients from degree 0. */
+   coefficients from degree 0, of which all but c_0 fit a word together. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
-    int64_t y = 0;
-    uint32_t h;
-    unsigned int first;
     unsigned int i;
     while (low < high) {
         const unsigned int middle = (low + high + 1u) / 2u;
@@ -31,13 +28,14 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
             high = middle - 1u;
         }
     }
-    h = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
-    first = low * (degree + 1u);
-    coefficient = &coefficient[first];
-    for (i = degree + 1u; i > 0; --i) {
-        y = coefficient[i - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
+    const uint32_t on = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
+    const int32_t h = (int32_t)(on & 0x7fffffffu);
+    coefficient = &coefficient[low * (degree + 1u)];
+    int32_t y = coefficient[degree];
+    for (i = degree - 1u; i > 0; --i) {
+        y = coefficient[i] + (int32_t)(((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
     }
-    return y;
+    return coefficient[0] + (((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
 }
 
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the

@@ -647,7 +647,7 @@ class FixedCurve:
         while todo:
             a, b = todo.pop()
             piece, miss = self._fit(a, b, allowed)
-            if b - a > 1 and (miss > allowed or max(map(abs, piece.coefficients)) > TABLE_MAX):
+            if b - a > 1 and (miss > allowed or sum(map(abs, piece.coefficients[1:])) + degree > TABLE_MAX):
                 if len(self.pieces) + len(todo) > MOST_PIECES:
                     message = "bends too sharply for fixed point over input_range; narrow the range or use float32"
                     raise FormatError((("model", "memoryless"), message))

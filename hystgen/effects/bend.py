@@ -43,7 +43,7 @@ def bends(
     pieces: Sequence[Sequence[BendPiece]], domain: Sequence[tuple[int, int]], scaled: Sequence[tuple[int, int]],
     degree: int,
 ) -> Bends:
-    """The tables of curves; a curve that is not needed has no pieces."""
+    """The tables of curves up to a degree; a curve that is not needed has no pieces."""
     flat = list(itertools.chain.from_iterable(pieces))
     first = [0, *itertools.accumulate(map(len, pieces))][: len(pieces)]
 
@@ -52,7 +52,7 @@ def bends(
         return found.reshape(-1, columns) if columns else found
 
     return Bends(
-        whole([one.knot for one in flat]), whole([one.coefficients for one in flat], degree + 1),
+        whole([one.knot for one in flat]), whole([one.coefficients[: degree + 1] for one in flat], degree + 1),
         whole([one.scale for one in flat]), whole(first), whole([len(each) for each in pieces]),
         whole(domain, 2), whole(scaled, 2),
     )

@@ -37,12 +37,11 @@ tries)."""
 
 
 SECANTS = 10
-"""Tries of a search in fixed point by secants, before it halves what is left of its interval: 3 to 5 are enough on
-smooth references, and 9 after jumps."""
+"""Tries of a search in fixed point by secants, before it halves what is left of its interval. Set by:
+benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8, some take 25."""
 
-
-SECANT = 64
-"""[steps of the plays' input] Least length of a secant: rounding of a play by half a step is then 2 % of its slope."""
+FASTEST = 2**31 - 1
+"""Largest rate: product with a word fits 63 bits."""
 
 
 class MovingTables(NamedTuple):
@@ -72,7 +71,8 @@ class MovingTables(NamedTuple):
 
 class FixedMovingTables(NamedTuple):
     """The same in fixed point. `first`, `second`: factors (n + 1, 2); `farthest`: the largest input that a search
-    tries; `near`: the least that half a step of the input changes the sum by; `relaxed`: tables of plays with the
+    tries; `near`: the least that half a step of the input changes the sum by; `rate_bits`: a rate is 2^rate_bits steps
+    of the input per change of the sum, `FASTEST` at the least slope; `relaxed`: tables of plays with the
     slopes that viscous plays with one time constant have in a step; `bump`: curves of bent plays less the plays
     themselves, with `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields`
     (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a
@@ -85,6 +85,7 @@ class FixedMovingTables(NamedTuple):
     second: Reals
     farthest: int
     near: int
+    rate_bits: int
     relaxed: Any  # `hystgen.compensator.layout.FixedTables`
     bump: Bends
     bump_of: Counts

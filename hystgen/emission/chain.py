@@ -283,7 +283,11 @@ def instance(
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS")] * bent,
+        *[
+            Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS"),
+            Field("signal_t", "staying", "sum of the plays that have not moved lately"),
+            Field("unsigned int", "released", "the last of the plays that have"),
+        ] * bent,
         *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
     ]
 

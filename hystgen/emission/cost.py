@@ -309,7 +309,8 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         plays.DASHPOT: ((4 + factor, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked, tanh = _bent(m)
-    twice = 1 + (m.moves == plays.RELAXING)  # a play's contribution, and where it will rest
+    # a play's contribution, and that where it will rest, or in fixed point where it has stayed
+    twice = 1 + (m.moves == plays.RELAXING or (m.moves == plays.PLAIN and isinstance(m, plays.FixedMovingTables)))
     tries, beside = _tries(m) if inverse else (0, (0, 0))
     tried = 1 + moved[0] + bent, 1 + moved[1] + looked
     if isinstance(m, plays.MovingTables):  # with the slope
@@ -317,7 +318,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         tried = 3 + sought[0] + bent, sought[1]
     return (
         tries + 1 + beside[0],
-        tries * tried[0] + 1 + moved[0] + kept[0] + twice * bent,
+        tries * tried[0] + moved[0] + kept[0] + twice * (1 + bent),
         beside[1] + 15 + 6 * inverse,
         tries * tried[1] + 2 + moved[1] + kept[1] + twice * looked,
         tanh * (tries + twice),
@@ -334,7 +335,8 @@ def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
 
     if isinstance(m, plays.FixedMovingTables):
         tries = 1 + plays.SECANTS + (2 * m.farthest + 1).bit_length()
-        return tries, (2 * QUOTIENT[0] * plays.SECANTS, 2 * QUOTIENT[1] * plays.SECANTS + 11 * tries)
+        secant = QUOTIENT[0] + 2, QUOTIENT[1] + 8  # and the way that its rate leads
+        return tries, (secant[0] * plays.SECANTS, secant[1] * plays.SECANTS + 8 * tries)
     tries = plays.NEWTON_TRIES + m.halves
     return tries, ((2 * m.turns + 1) * (plays.NEWTON_TRIES + 2) + tries, 5 * tries)
 

@@ -135,7 +135,7 @@ class FixedForm(Form):
         numbers: list[Macro] = [
             ("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search"),
             ("NEAR", operand(plays.near), "least change of the sum with half a step of the input"),
-            ("SECANT", f"{moving.SECANT}", "least length of a secant, in steps of the input"),
+            ("RATE_BITS", f"{plays.rate_bits}u", "of steps of the input per change of the sum, below one"),
             ("SECANTS", f"{moving.SECANTS}u", "tries of a search by secants, before those by halving"),
         ]
         if plays.scanned:

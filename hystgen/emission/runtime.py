@@ -227,7 +227,7 @@ class FloatFamily(Family):
 class FixedFamily(Family):
     """Fixed point."""
 
-    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", ("relaxing", "dilated")
+    kind, form, ending, moves_apart = "fixed", "fixed", "_fixed", ()
     helpers = (*HELPERS, "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
@@ -307,7 +307,8 @@ class Variant:
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
-            "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
+            "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
+            "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
             "MOVES_APART": bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
         }

@@ -75,9 +75,9 @@ def mantissa(x: int) -> tuple[int, int]:
 
 
 @jit
-def quotient(x: int, y: int) -> int:
-    """x / y to a part in 2^28 and to the nearest whole number, for whole x >= 0 and y > 0 below 2^62; no less than 2^60
-    beyond that."""
+def quotient(x: int, y: int, bits: int) -> int:
+    """2^bits x / y to a part in 2^28 and to the nearest whole number, for whole x >= 0 and y > 0 below 2^62; no less
+    than 2^59 where it is above that."""
     if x == 0:
         return x
     number, raised = mantissa(x)
@@ -85,7 +85,7 @@ def quotient(x: int, y: int) -> int:
     rate = LINE - ((divisor * FALL) >> 31)
     for _ in range(3):  # 2^61/divisor: each step squares its share of error, at first 1/17
         rate = (rate * ((1 << 31) - ((divisor * rate) >> 31))) >> 30
-    shift = 60 + raised - lifted
+    shift = 60 + raised - lifted - bits
     if shift > 62:
         return x - x
     return (((number * rate) >> (shift if shift > 0 else 0)) + 1) >> 1

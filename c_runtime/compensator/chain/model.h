@@ -36,8 +36,8 @@
 #define HYSTGEN_LARGEST_LEVEL 782495278648LL
 #define HYSTGEN_LARGEST_INPUT 2147483647
 #define HYSTGEN_NEAR 500
-#define HYSTGEN_SECANT 64
 #define HYSTGEN_SECANTS 10u
+#define HYSTGEN_RATE_BITS 60u
 #define HYSTGEN_SHARE_BITS 0u
 #define HYSTGEN_BRAKED_DROP 4u
 #define HYSTGEN_BUMP_DEGREE 5u
@@ -130,6 +130,8 @@ typedef struct {
 #ifndef HYSTGEN_HAS_CORNERS
     hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
     hystgen_sum_t bent[HYSTGEN_N_PLAYS];
+    hystgen_sum_t staying;
+    unsigned int released;
     hystgen_search_t search;
 #else
     bool sought;

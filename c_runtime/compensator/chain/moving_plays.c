@@ -1,6 +1,6 @@
 /* Operators of a model with effects: plays moved or bent by an effect. The state of play i is the
-   value at which the play would come to rest (`play`) and its contribution at this value (`bent`).
-   Called by chain.c and moving_search.c. */
+   value at which the play would come to rest (`play`). In floating point, its contribution there is
+   kept (`bent`). Called by chain.c and moving_search.c. */
 #ifndef HYSTGEN_CHAIN_MOVING_PLAYS_C
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"
@@ -40,6 +40,130 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 }
 #endif
 
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
+/* Plays that are bent but move with their input alone leave their places in the order of their
+   thresholds. The contributions of those that stay are kept as a sum (`staying`). Takes those that
+   leave for w out of it. */
+HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_play_t w) {
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = self->released + 1u; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (hystgen_resting(i, self->play, w) == self->play[i]) {
+            break;
+        }
+        self->staying -= hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
+        self->released = i;
+    }
+}
+
+/* Sum of the plays after their input has moved to w, for which those that leave are released;
+   increases with w. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= self->released; ++i) {
+        sum += hystgen_model_tables.weight[i] *
+               hystgen_bent(i, hystgen_resting(i, self->play, w));
+    }
+    return sum;
+}
+
+/* The plays move while their input moves to w, where their sum is `sum`. All of them stay once the
+   last one that has moved does. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w,
+                                         hystgen_sum_t sum) {
+    hystgen_play_t before = 0;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= self->released; ++i) {
+        before = self->play[i];
+        self->play[i] = hystgen_resting(i, self->play, w);
+    }
+    self->play[0] = w;
+    if (self->play[self->released] == before) {
+        self->staying = sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+        self->released = 0;
+    }
+    self->level = hystgen_level(sum);
+}
+
+/* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
+   sum, unless a search has just found it. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    if (!self->moving) {
+        self->staying = 0;
+        self->released = HYSTGEN_N_PLAYS;
+    }
+#ifdef HYSTGEN_INVERSE
+    if (!self->moving || w != self->search.input) {
+        hystgen_operator_release(self, w);
+        self->search.input = w;
+        self->search.found = hystgen_operator_sum(self, w);
+    }
+    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
+    hystgen_operator_move(self, w, self->search.found);
+#else
+    hystgen_operator_release(self, w);
+    hystgen_operator_move(self, w, hystgen_operator_sum(self, w));
+#endif
+}
+#elif defined(HYSTGEN_FIXED)
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+#ifdef HYSTGEN_HAS_DILATED_PLAYS
+    if (self->moving && w != self->play[0]) { /* thresholds do not grow with no move */
+#else
+    if (self->moving) {
+#endif
+        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+            const hystgen_play_t z = hystgen_moved(i, self->play, self->play[0], w);
+            sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+        }
+        return sum;
+    }
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t z = hystgen_resting(i, self->play, w);
+        sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, z);
+    }
+    return sum;
+}
+
+/* The plays move while their input moves to w, or come to rest. Updates their sum. */
+HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w) {
+    const hystgen_play_t x = self->play[0];
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (self->moving) {
+            (void)hystgen_move(i, self->play, x, w);
+        } else {
+            hystgen_put(i, self->play, hystgen_resting(i, self->play, w));
+        }
+        sum += (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
+    }
+    self->play[0] = w;
+    self->level = hystgen_level(sum);
+}
+
+/* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
+   sum. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+#ifdef HYSTGEN_INVERSE
+    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
+#endif
+    hystgen_operator_move(self, w);
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
+    if (self->moving) {
+        hystgen_relax(self->play, NULL);
+    }
+#endif
+}
+#else
 /* Contribution of play i where it is. */
 static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t *play,
                                          const hystgen_sum_t *bent) {
@@ -108,60 +232,28 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
-/* The plays come to rest with their input at w, and a search begins anew. Updates their sum. */
-static void hystgen_operator_settle_plays(hystgen_operator_t *self, hystgen_play_t w) {
-#ifdef HYSTGEN_INVERSE
-    self->search.slope = hystgen_model_tables.weight[0];
-#endif
-    self->level = hystgen_level(hystgen_moved_rest(self->play, hystgen_operator_bent(self), w));
-}
-
-/* The plays follow their input w. Updates their sum. */
+/* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
+   sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t *bent = hystgen_operator_bent(self);
     if (self->moving) {
-        hystgen_sum_t *bent = hystgen_operator_bent(self);
         self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+#ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
+#endif
     } else {
-        hystgen_operator_settle_plays(self, w);
+#ifdef HYSTGEN_INVERSE
+        self->search.slope = hystgen_model_tables.weight[0];
+#endif
+        self->level = hystgen_level(hystgen_moved_rest(self->play, bent, w));
     }
 }
+#endif
 
-/* Sum of the plays in the start memory. */
+/* Sum of the plays in the start memory, at rest. */
 static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
-    hystgen_operator_settle_plays(self, self->play[0]);
+    hystgen_operator_follow(self, self->play[0]);
     return self->level;
 }
-
-#if defined(HYSTGEN_INVERSE) && defined(HYSTGEN_FIXED)
-/* Contribution of play i at z. */
-static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
-                                                const hystgen_sum_t *bent, hystgen_play_t z) {
-    return z >= play[i] && z <= play[i] ? hystgen_staying(i, play, bent) : hystgen_bent(i, z);
-}
-
-/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(hystgen_inverse_t *self, hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    if (self->moving) {
-        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_sum_t value =
-                hystgen_contributed(i, self->play, hystgen_operator_bent(self),
-                                    hystgen_reached(i, self->play, self->play[0], w));
-            sum = sum + hystgen_model_tables.weight[i] * value;
-        }
-        return sum;
-    }
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value =
-            hystgen_contributed(i, self->play, hystgen_operator_bent(self), z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-    }
-    return sum;
-}
-#endif
 
 #endif

@@ -15,21 +15,10 @@ static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
     return x < 0 ? -x : x;
 }
 
-/* Begins a search for the sum h at the present input. */
-HYSTGEN_APART void hystgen_inverse_seek(hystgen_inverse_t *self, hystgen_signal_t h) {
-    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
-    self->search.top = HYSTGEN_LARGEST_INPUT;
-    self->search.short_of = 0;
-    self->search.over = -1;
-    self->search.sum = hystgen_asked(h);
-    self->search.input = self->play[0];
-    self->search.before = self->play[0];
-}
-
 /* Takes the sum at the input tried last. The interval ends there from now on. Returns whether the
    search is over. */
-HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t found) {
-    search->found = found;
+HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
+    const hystgen_sum_t found = search->found;
     if (found < search->sum) {
         search->low = search->input;
         search->short_of = search->sum - found;
@@ -40,66 +29,70 @@ HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search, hystgen_sum_t 
     return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
 }
 
-/* Updates the slope to that of the secant through the last two inputs, if they are far apart. */
-HYSTGEN_APART void hystgen_inverse_turn(hystgen_inverse_t *self) {
-    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)self->search.input - self->search.before);
-    if (way >= HYSTGEN_SECANT) {
-        const hystgen_sum_t gained = hystgen_size(self->search.found - self->search.last);
-        const hystgen_sum_t slope = hystgen_quotient(gained, way);
-        self->search.slope = slope > 1 ? slope : 1;
+/* Updates the rate to that of the secant through the last two inputs, once there are two. */
+HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
+    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->before);
+    if (way > 0) {
+        const hystgen_sum_t gained = hystgen_size(search->found - search->last);
+        const hystgen_sum_t some = gained > 1 ? gained : 1;
+        const hystgen_sum_t rate = hystgen_quotient(way, some, HYSTGEN_RATE_BITS);
+        const hystgen_sum_t inside = rate > INT32_MAX ? INT32_MAX : rate;
+        search->rate = (uint32_t)(inside > 1 ? inside : 1);
     }
 }
 
-/* The way from the input tried last to the solution by the slope. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_left(const hystgen_inverse_t *self) {
-    return hystgen_quotient(hystgen_size(self->search.found - self->search.sum),
-                            self->search.slope);
+/* The input to which the rate leads from the one tried last, at least one on and not beyond all. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
+    const hystgen_sum_t input = search->input;
+    const hystgen_sum_t left = search->sum - search->found;
+    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (left > 0 ? input : -input);
+    const uint64_t size = (uint64_t)hystgen_size(left);
+    const uint64_t steps = hystgen_wide((uint32_t)(size >> HYSTGEN_WORD), search->rate) +
+                           (hystgen_wide((uint32_t)size, search->rate) >> HYSTGEN_WORD);
+    const unsigned int finer = HYSTGEN_RATE_BITS - HYSTGEN_WORD;
+    const hystgen_sum_t on = (hystgen_sum_t)((steps + (((uint64_t)1 << finer) >> 1)) >> finer);
+    const hystgen_sum_t some = on > 1 ? on : 1;
+    const hystgen_sum_t inside = some > room ? room : some;
+    return left > 0 ? input + inside : input - inside;
 }
 
-/* Goes on to an input inside the interval, or else to its middle. */
-HYSTGEN_APART void hystgen_inverse_go(hystgen_search_t *search, hystgen_sum_t next) {
+/* Goes on to the next input: by the rate of a secant, if that leads inside the interval and has not
+   been tried too often; else to the middle of the interval. */
+HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
+    hystgen_sum_t next = search->input; /* an end of the interval */
+    if (search->tries < HYSTGEN_SECANTS) {
+        ++search->tries;
+        hystgen_inverse_turn(search);
+        next = hystgen_inverse_further(search);
+    }
+    if (next <= search->low || next > search->top) {
+        next = search->low + ((hystgen_sum_t)search->top - search->low + 1) / 2;
+    }
     search->before = search->input;
     search->last = search->found;
-    if (next > search->low && next <= search->top) {
-        search->input = (hystgen_play_t)next;
-    } else {
-        const hystgen_sum_t size = (hystgen_sum_t)search->top - search->low + 1;
-        search->input = (hystgen_play_t)(search->low + size / 2);
-    }
-}
-
-/* The input a way on from the one tried last, at least one and not beyond all. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search,
-                                                    hystgen_sum_t way) {
-    const bool rising = search->found < search->sum;
-    const hystgen_sum_t input = search->input;
-    const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (rising ? input : -input);
-    const hystgen_sum_t some = way > 1 ? way : 1;
-    const hystgen_sum_t inside = some > room ? room : some;
-    return rising ? input + inside : input - inside;
-}
-
-/* Goes on to the next input: by the slope of a secant, or, after too many tries, to the middle of
-   the interval, which the input tried last is an end of. */
-HYSTGEN_APART void hystgen_inverse_advance(hystgen_inverse_t *self, bool secant) {
-    hystgen_sum_t next = self->search.input;
-    if (secant) {
-        hystgen_inverse_turn(self);
-        next = hystgen_inverse_further(&self->search, hystgen_inverse_left(self));
-    }
-    hystgen_inverse_go(&self->search, next);
+    search->input = (hystgen_play_t)next;
 }
 
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
-    unsigned int tries = 0;
-    hystgen_inverse_seek(self, h);
-    while (!hystgen_inverse_over(&self->search, hystgen_inverse_sum(self, self->search.input))) {
-        hystgen_inverse_advance(self, tries < HYSTGEN_SECANTS);
-        if (tries < HYSTGEN_SECANTS) {
-            ++tries;
-        }
+    self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
+    self->search.top = HYSTGEN_LARGEST_INPUT;
+    self->search.short_of = 0;
+    self->search.over = -1;
+    self->search.sum = hystgen_asked(h);
+    self->search.tries = 0;
+    self->search.input = self->play[0];
+    self->search.before = self->play[0];
+#ifndef HYSTGEN_HAS_PLAIN_PLAYS
+    self->search.found = hystgen_inverse_sum(self, self->search.input);
+#endif /* they have just followed an input, at which their sum is known */
+    while (!hystgen_inverse_over(&self->search)) {
+        hystgen_inverse_advance(&self->search);
+#ifdef HYSTGEN_HAS_PLAIN_PLAYS
+        hystgen_inverse_release(self, self->search.input);
+#endif
+        self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
     if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
         return self->search.input;
@@ -151,7 +144,8 @@ static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (!hystgen_inverse_tries(self, at, i)) {
-            at->sum = at->sum + hystgen_model_tables.weight[i] * hystgen_staying(i, self->play, bent);
+            at->sum =
+                at->sum + hystgen_model_tables.weight[i] * hystgen_staying(i, self->play, bent);
         }
     }
 #endif

@@ -141,11 +141,12 @@ typedef struct {
     int64_t over;     /* and what it has too much above `top`, or -1 */
     int64_t found;    /* sum at the input tried last, */
     int64_t last;     /* and at the one before */
-    int64_t slope;    /* change of the sum per change of the input; kept from search to search */
+    uint32_t rate;    /* change of the input per change of the sum; kept from search to search */
     int32_t input;    /* the one tried last, */
     int32_t before;   /* and the one before */
     int32_t low;
     int32_t top;
+    uint8_t tries; /* by secants */
 } hystgen_search_t;
 #else
 typedef struct {

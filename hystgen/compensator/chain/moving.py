@@ -331,7 +331,8 @@ def build_fixed(
     own = build(static, effects, seconds, largest_step, np.float64)
     first, second = (np.array([factor(x) for x in each], dtype=np.int64) for each in (own.first, own.second))
     ends, scaled = [(-bump.end, bump.end)] * len(bump.curves), [(0, bump.lift)] * len(bump.curves)
-    degree = bump.curves[0].degree if bump.curves else 0
+    terms = [k for curve in bump.curves for piece in curve.pieces for k, c in enumerate(piece.coefficients) if c]
+    degree = max(terms, default=1)
     curves = bends([curve.pieces for curve in bump.curves], ends, scaled, degree)
     relaxed = _relaxed(plays, float(own.first[1])) if own.scanned else plays
     least, weight = slopes(static, effects, seconds)[0], static.pi.weights[0]
@@ -343,8 +344,8 @@ def build_fixed(
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
     return at.FixedMovingTables(
-        own.moves, own.bends, own.scanned, first, second, farthest, near, relaxed, curves,
-        np.array(bump.of, dtype=np.int64), bump.bits,
+        own.moves, own.bends, own.scanned, first, second, farthest, near, max(32, 31 + near.bit_length()), relaxed,
+        curves, np.array(bump.of, dtype=np.int64), bump.bits,
         np.array(rows, dtype=np.int64).reshape(-1, 7), bits, stretch_end,
         np.array(factor(float(own.number[at.SEEN])), dtype=np.int64),
     )

@@ -9,8 +9,9 @@ from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import SECANT, SECANTS, FixedMovingTables
+from hystgen.effects.plays import FASTEST, SECANTS, FixedMovingTables
 from hystgen.plays.fixed import loop_solve, nearest, quotient
+from hystgen.plays.slots import Reals
 
 
 @jit(inline=True)
@@ -20,15 +21,12 @@ def size(x: int) -> int:
 
 
 @jit
-def input_after(t: FixedChainTables, w: int, left: int, slope: int) -> int:
-    """The input that `slope` leads to from w, at least one on and none beyond all."""
-    farthest = t.moving.farthest
-    room = farthest - w if left > 0 else farthest + w
-    step = quotient(size(left), slope)
-    if step < 1:
-        step = step + 1
-    if step > room:
-        step = room
+def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
+    """The input to which the change `left` of the sum leads from w by a rate, at least one on and none beyond all."""
+    room = m.farthest - w if left > 0 else m.farthest + w
+    more = size(left)
+    step = (more >> 32) * rate + (((more & 0xFFFFFFFF) * rate) >> 32)
+    step = min(max((step + ((1 << (m.rate_bits - 32)) >> 1)) >> (m.rate_bits - 32), 1), room)
     return w + step if left > 0 else w - step
 
 
@@ -40,8 +38,9 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
         """Input of the plays at which their sum is h: by secants from the present input, the first one as steep as the
         last of the sample before, within the interval of inputs that are left, then by halving it. The nearer of two
         neighbours, or the input beyond the farthest if even that is not enough."""
-        low = -t.moving.farthest - 1
-        high = t.moving.farthest + 1
+        m = t.moving
+        low = -m.farthest - 1
+        high = m.farthest + 1
         short = 0  # of the sum at `low`; ends beyond the farthest input are not tried, but taken if they remain
         over = -1  # and at `high`
         w = s.plays.play[0]
@@ -50,24 +49,24 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
         tries = 0
         while True:
             total = sum_at(t, s, w)
-            if total < h:
+            left = h - total
+            if left > 0:
                 low = w
-                short = h - total
+                short = left
             else:
                 high = w
-                over = total - h
-            if size(total - h) <= t.moving.near:
+                over = -left
+            if size(left) <= m.near:
                 return w
             if high - low == 1:
                 return high if short > over else low
             way = size(w - before)
-            if tries < SECANTS and way >= SECANT:
-                slope = quotient(size(total - last), way)
-                s.bent[0] = slope if slope > 0 else slope + 1
+            if tries < SECANTS and way > 0:
+                s.bent[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
             before = w
             last = total
             if tries < SECANTS:
-                w = input_after(t, w, h - total, s.bent[0])
+                w = input_after(m, w, left, s.bent[0])
             if w <= low or w >= high:  # nor is the end that was just tried
                 w = low + (high - low) // 2
             tries += 1
@@ -84,12 +83,14 @@ def level(t: FixedChainTables, total: int) -> int:
 @jit
 def asked(t: FixedChainTables, h: int) -> int:
     """The sum of the plays that a signal asks for, limited to their range."""
-    inside = h
-    if inside > t.number.largest_level[0]:
-        inside = t.number.largest_level[0]
-    elif inside < -t.number.largest_level[0]:
-        inside = -t.number.largest_level[0]
-    return inside << t.number.level_drop[0]
+    most = t.number.largest_level[0]
+    return min(max(h, -most), most) << t.number.level_drop[0]
+
+
+@jit(inline=True)
+def begin(_: Reals) -> int:
+    """The rate that the first search begins with: the largest."""
+    return FASTEST
 
 
 @jit(inline=True)
@@ -98,4 +99,4 @@ def ordered(_: FixedMovingTables) -> bool:
     return False
 
 
-PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search, ordered))
+PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search, begin, ordered))

@@ -11,7 +11,7 @@ from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects import plays as at
 from hystgen.plays.loop import loop_solve
-from hystgen.plays.slots import zero
+from hystgen.plays.slots import Reals, zero
 
 
 def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> Answer:
@@ -60,10 +60,16 @@ def same(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed
 
 
 @jit(inline=True)
+def begin(p: Reals) -> Scalar:
+    """The slope that the first search begins with: that of no play following."""
+    return p[0]
+
+
+@jit(inline=True)
 def ordered(m: at.MovingTables) -> bool:
     """Whether a sum takes plays behind the first one that stays to stay as well: if they keep the order of their
     thresholds but for rounding, and `Mover.disorder`."""
     return m.moves in (at.PLAIN, at.DASHPOT)
 
 
-PLAYS = operators(Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, search, ordered))
+PLAYS = operators(Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, search, begin, ordered))

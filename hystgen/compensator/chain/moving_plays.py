@@ -22,13 +22,14 @@ class Kind(NamedTuple):
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
     search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
+    begin: Function  # of weights: the slope or rate that the first search begins with
     ordered: Function  # of moving tables: whether a sum takes plays behind the first one that stays to stay as well
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
     number."""
-    level, asked, solve, moves, (bent, steep), search, ordered = kind
+    level, asked, solve, moves, (bent, steep), search, begin, ordered = kind
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
@@ -102,11 +103,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is the slope that a
-        search begins with."""
+        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is what a search
+        begins with: the slope, in fixed point the rate."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
-        values[0] = p[0]
+        values[0] = begin(p)
         for i in range(1, len(r)):
             put(m, i, s, lost, resting(r, s, i, w))
             values[i] = bent(m, plays, i, s.play[i])

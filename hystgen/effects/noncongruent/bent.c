@@ -22,30 +22,23 @@ static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z
 }
 #endif
 #elif defined(HYSTGEN_FIXED)
-/* Contribution at z of a play bent by curve c, in fixed point: z plus the value of the curve.
-   Beyond the range of the plays a curve keeps its end value. */
-HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
-    int32_t inside;
+/* Contribution of play i at z, in fixed point: z plus the value of a curve, which several plays may
+   share. Beyond the range of the plays a curve keeps its end value. */
+HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
+    const hystgen_bump_t *c = &hystgen_bump[hystgen_bump_of[i]];
+    int32_t inside = z;
     if (z < -HYSTGEN_BUMP_END) {
         inside = -HYSTGEN_BUMP_END;
     } else if (z > HYSTGEN_BUMP_END) {
         inside = HYSTGEN_BUMP_END;
-    } else {
-        inside = z;
     }
     const int64_t value =
         hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, HYSTGEN_BUMP_DEGREE, inside);
     return z + hystgen_nearest(value * ((int64_t)1 << HYSTGEN_BUMP_LIFT), HYSTGEN_BUMP_BITS);
 }
-
-/* Contribution of play i at z; several plays may share a curve. */
-HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
-    const uint16_t curve = hystgen_bump_of[i];
-    return hystgen_bent_by(&hystgen_bump[curve], z);
-}
 #elif defined(HYSTGEN_HAS_BUMP)
-/* Contribution of play i at z: more or less than z around a centre. `bump`: hystgen_bump_at of z. Sets
-   its change per change of z. */
+/* Contribution of play i at z: more or less than z around a centre. `bump`: hystgen_bump_at of z.
+   Sets its change per change of z. */
 static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z,
                                                 hystgen_real_t bump, hystgen_real_t *steep) {
     (void)i;
@@ -92,10 +85,10 @@ HYSTGEN_APART hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
 }
 #endif
 
-/* Contribution of play i at z. Keeps it, if it is not z itself. */
+/* Contribution of play i at z. Keeps it in floating point, if it is not z itself. */
 static inline hystgen_sum_t hystgen_bent_anew(unsigned int i, hystgen_play_t z,
                                               hystgen_sum_t *bent) {
-#ifdef HYSTGEN_HAS_BENT_PLAYS
+#if defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_FIXED)
     bent[i - 1u] = hystgen_bent(i, z);
     return bent[i - 1u];
 #else

@@ -75,12 +75,6 @@ HYSTGEN_APART bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_
 }
 #endif
 
-/* The present values of the plays are their rest values: plays creep on only in the next steps. */
-static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
-    (void)play;
-    (void)bent;
-}
-
 /* Play i moves while the input of the plays moves from x to w. Returns whether it does. */
 HYSTGEN_APART_IN_FLOAT bool hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x,
                                          hystgen_play_t w) {

@@ -67,7 +67,14 @@ static inline hystgen_sum_t hystgen_widened(unsigned int i, hystgen_sum_t way) {
 /* Play i after the input of the plays has moved from x to w. */
 static hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play, hystgen_play_t x,
                                     hystgen_play_t w) {
-    const hystgen_sum_t way = w > x ? (hystgen_sum_t)w - x : (hystgen_sum_t)x - w;
+#ifdef HYSTGEN_FIXED
+    const uint32_t way = (uint32_t)(w > x ? (hystgen_sum_t)w - x : (hystgen_sum_t)x - w);
+    if (hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]) == play[i]) {
+        return play[i]; /* nor does a larger threshold move it */
+    }
+#else
+    const hystgen_sum_t way = w > x ? w - x : x - w;
+#endif
     return hystgen_drawn(play[i], w, hystgen_widened(i, way));
 }
 
@@ -107,12 +114,6 @@ bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigne
     return w + r < play[i];
 }
 #endif
-
-/* The present values of the plays are their rest values. */
-static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
-    (void)play;
-    (void)bent;
-}
 #endif
 
 #endif
