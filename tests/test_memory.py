@@ -145,7 +145,7 @@ def test_pictures_and_short_forms(tmp_path: Path) -> None:
     assert found.sentence() in found._repr_html_().replace("&#x27;", "'").replace("&gt;", ">").replace("&lt;", "<")
     assert len(found.plot().axes) == 1
     assert len(found.plot("against", tmp_path / "b.svg").axes) > 3
-    with pytest.raises(ValueError, match="which 'loop' is none of gap, overlay"):
+    with pytest.raises(ValueError, match="which 'loop' is not one of gap, overlay"):
         found.plot("loop")
 
 
