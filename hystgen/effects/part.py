@@ -328,7 +328,8 @@ class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
     fixed point the tables are made from `formats` of a block, the surroundings, and the largest input and output.
 
-    `kinds`: of its C; `beside`: constants of an additional struct for each block.
+    `kinds`: of its C; `beside`: constants of an additional struct for each block; `degrees`: the temperature, degC, at
+    which its gain holds, from its tables.
     """
 
     verbs: Verbs
@@ -337,6 +338,7 @@ class Realized:
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
     kinds: tuple[BlockKind, ...] = ()
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
+    degrees: Callable[[Any], float] | None = None
 
 
 class Setting(NamedTuple):

@@ -261,10 +261,6 @@ class Form(ABC):
         return 0
 
     @abstractmethod
-    def reference_temperature(self, t: ChainTables) -> float:
-        """The temperature, degC, at which the model's gain holds."""
-
-    @abstractmethod
     def between(self, low: Number, high: Number, part: float) -> Number:
         """The number at this fraction of a range, in operations of the arithmetic."""
 

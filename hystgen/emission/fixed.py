@@ -202,12 +202,6 @@ class FixedForm(Form):
 
         return int(t.number.drive_bits[0])
 
-    def reference_temperature(self, t: ChainTables) -> float:
-        from hystgen.effects.thermal import fixed as thermal
-
-        degrees: float = t.of("gain").reference[0].item() / 2.0**thermal.TEMPERATURE_BITS
-        return degrees
-
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
         return _factors(own, rows, writer)
 

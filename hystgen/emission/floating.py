@@ -139,10 +139,6 @@ class FloatingForm(Form):
             ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
         ]
 
-    def reference_temperature(self, t: ChainTables) -> float:
-
-        return float(t.of("gain").reference[0])
-
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
         return writer.array("real_t", own, list(rows))
 

@@ -12,7 +12,7 @@ import numpy as np
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS
-from hystgen.emission.compensator import EmittedModel, Form
+from hystgen.emission.compensator import EmittedModel
 from hystgen.emission.text import literal
 from hystgen.plays import slots
 
@@ -84,7 +84,7 @@ def operators(one: EmittedModel) -> list[Operator]:
     return found
 
 
-def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
+def _setting(t: ChainTables, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before rounding to a code; every third exceeds the limits, if there are
     any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
@@ -98,7 +98,8 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     if call == "set_offset":
         return way * (high - low)
     if call == "set_temperature":
-        return degree * (form.reference_temperature(t) + 40.0 * way)
+        holds = next(of(t.of(part.name)) for part in PARTS if t.number_of(part.name) and (of := part.of(t).degrees))
+        return degree * (holds + 40.0 * way)
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
@@ -123,7 +124,7 @@ def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[
         if settings and not isinstance(numbers, Tables | FixedTables) and i % 11 == 5:
             call = settings[i // 11 % len(settings)]
             calls.append(SETTINGS[call])
-            argument = _setting(numbers, one.form, call, i // 11 // len(settings))
+            argument = _setting(numbers, call, i // 11 // len(settings))
             arguments.append(argument)
     x = reference.nearest(numbers, np.array(arguments))
     op = np.array(calls, dtype=np.uint8)

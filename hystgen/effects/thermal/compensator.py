@@ -537,7 +537,9 @@ class UnevenHeat:
             _, self.depth, self.up = self._heat(before, drive, seconds)
 
 
-ARITHMETIC = Realized(gain_verbs(FLOATING), numbered(KIND, 1, 1), tables, kinds=(KIND,))
+ARITHMETIC = Realized(
+    gain_verbs(FLOATING), numbered(KIND, 1, 1), tables, kinds=(KIND,), degrees=lambda t: float(t.reference[0])
+)
 HEAT_ARITHMETIC = Realized(
     heat_verbs(FLOATING, memory_of(HeatMemory), warmed, FLOATING.given, FLOATING.given),
     numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,

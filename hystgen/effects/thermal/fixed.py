@@ -261,7 +261,10 @@ def narrowed(t: FixedHeatNumbers, j: int, gain: int) -> int:
 STATE_BITS = 31
 """Bits of a rubbing play, excluding its sign; a drive takes 15 or 31 of them."""
 
-ARITHMETIC = Realized(floating.gain_verbs(FIXED), numbered(KIND, 2, 2), made, formats, kinds=(KIND,))
+ARITHMETIC = Realized(
+    floating.gain_verbs(FIXED), numbered(KIND, 2, 2), made, formats, kinds=(KIND,),
+    degrees=lambda t: float(t.reference[0]) / 2.0**TEMPERATURE_BITS,
+)
 HEAT_ARITHMETIC = Realized(
     floating.heat_verbs(FIXED, memory_of(FixedHeatMemory), warmed, narrowed, FIXED.given),
     numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
