@@ -274,3 +274,9 @@ def _listen() -> None:
 def inside(x: N, least: N, most: N) -> N:
     """x within limits."""
     return least if x < least else most if x > most else x
+
+
+@jit(inline=True)
+def zero(x: N) -> N:
+    """0 in the type of x, which is finite."""
+    return x - x

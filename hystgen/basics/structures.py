@@ -17,7 +17,7 @@ from typing import Annotated, Any, Protocol, Self, TypeAlias, get_args, get_orig
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from hystgen.basics.jit import Element
+from hystgen.basics.jit import Element, Scalar, jit
 
 
 class NumberArray(Protocol):
@@ -107,6 +107,24 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
     def of(cls, rows: Iterable[Any], real: DTypeLike = np.int64) -> Self:
         """One structure per row; a row lists the members in order, with nested structures as tuples."""
         return np.array([tuple(row) for row in rows], cls.layout(np.dtype(real))).view(cls)
+
+
+class TwoParts(Protocol):
+    """Numbers in two parts, since their steps may be far smaller than their last bit."""
+
+    high: NumberArray
+    low: NumberArray
+
+
+@jit
+def added(s: TwoParts, j: int, change: Scalar) -> Scalar:
+    """Add to number j in two parts. Returns its upper part."""
+    high = s.high[j]
+    change = change + s.low[j]
+    following: Scalar = high + change
+    s.high[j] = following
+    s.low[j] = change - (following - high)
+    return following
 
 
 class Factor(Struct):

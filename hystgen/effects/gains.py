@@ -6,10 +6,8 @@ import itertools
 from typing import NamedTuple, Protocol
 
 from hystgen.arithmetic.factors import multiplied, times
-from hystgen.basics.jit import Action, Answer, Scalar, jit
-from hystgen.basics.structures import Factor, NumberArray, Signal, Struct
-from hystgen.effects.kinds import TwoParts
-from hystgen.plays.slots import zero
+from hystgen.basics.jit import Action, Answer, Scalar, jit, zero
+from hystgen.basics.structures import Factor, NumberArray, Signal, Struct, TwoParts
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 """[times] A gain is kept between these: a gain beyond them that the caller sets is due to a faulty sensor or a wrong

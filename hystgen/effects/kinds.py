@@ -9,32 +9,14 @@ import textwrap
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from hystgen.basics.jit import Answer, Jit, Scalar, jit
-from hystgen.basics.structures import NumberArray, Struct
+from hystgen.basics.structures import Struct
 from hystgen.plays.slots import Counts
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
-
-
-class TwoParts(Protocol):
-    """Numbers in two parts, since their steps may be far smaller than their last bit."""
-
-    high: NumberArray
-    low: NumberArray
-
-
-@jit
-def added(s: TwoParts, j: int, change: Scalar) -> Scalar:
-    """Add to number j in two parts. Returns its upper part."""
-    high = s.high[j]
-    change = change + s.low[j]
-    following: Scalar = high + change
-    s.high[j] = following
-    s.low[j] = change - (following - high)
-    return following
 
 
 B = TypeVar("B", bound=Struct)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import N, jit
 from hystgen.basics.structures import Flag, NumberArray, Real, Struct, UInt32
 
 Reals = NumberArray
@@ -72,9 +71,3 @@ class StepState(Struct):
     sought: Flag  # a solution has been found since the plays last followed
     bits: UInt32  # status of the last answer
     status: UInt32
-
-
-@jit(inline=True)
-def zero(x: N) -> N:
-    """0 in the type of x, which is finite."""
-    return x - x

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hystgen.basics.jit import Answer, Scalar, jit
+from hystgen.basics.jit import Answer, Scalar, jit, zero
 from hystgen.compensator.chain.layout import FloatChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects import plays as at
 from hystgen.plays.loop import loop_solve
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import Reals
 
 
 def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> Answer:

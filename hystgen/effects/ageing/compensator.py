@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hystgen.basics.jit import Action, Answer, Scalar, inside, jit
+from hystgen.basics.jit import Action, Answer, Scalar, inside, jit, zero
 from hystgen.basics.structures import (
     Count,
     Flag,
@@ -49,7 +49,6 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import jit, zero
 from hystgen.basics.structures import Factor, Flag, FourNarrow, Narrow, Signal, Struct, UInt8, firsts
 from hystgen.effects.ageing import compensator as floating
 from hystgen.effects.ageing.compensator import Aged, AgeingPiece, AgeingTable
@@ -23,7 +23,6 @@ from hystgen.effects.gains import (
 )
 from hystgen.effects.kinds import RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
-from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
 """Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""

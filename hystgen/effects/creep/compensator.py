@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import Scalar, jit
-from hystgen.basics.structures import Count, Real, Struct, firsts, memory_of
+from hystgen.basics.jit import Scalar, jit, zero
+from hystgen.basics.structures import Count, Real, Struct, added, firsts, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, added, numbered
+from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, numbered
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:

@@ -15,13 +15,12 @@ import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import jit, zero
 from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, firsts, memory_of
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import zero
 
 
 class FixedCreepTerm(Struct):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hystgen.basics.jit import Action, Answer, Scalar, inside, jit
+from hystgen.basics.jit import Action, Answer, Scalar, inside, jit, zero
 from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Realized, Unmeasured, Verbs, called, late
-from hystgen.plays.slots import zero
 
 # ---------------------------------------------------------------- clock.c
 

@@ -10,13 +10,12 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from hystgen.basics.jit import inside, jit
+from hystgen.basics.jit import inside, jit, zero
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import FixedSurroundings, Realized
-from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**44
 """Maximum number of samples counted: half a year at 1 MHz. A drift that is then still in range stays constant."""

@@ -11,13 +11,13 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.jit import N, Scalar, inside, jit
-from hystgen.basics.structures import Real, Struct, memory_of
+from hystgen.basics.jit import N, Scalar, inside, jit, zero
+from hystgen.basics.structures import Real, Struct, added, memory_of
 from hystgen.effects.base import Block, Place, decays
-from hystgen.effects.kinds import BlockKind, Constants, added
+from hystgen.effects.kinds import BlockKind, Constants
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts
 
 LONG_STEP = 2.0
 """[time constants per step] From this step length on the lag is inverted exactly. The inverse's pole is then above

@@ -15,7 +15,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
-from hystgen.basics.jit import inside, jit
+from hystgen.basics.jit import inside, jit, zero
 from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as floating
@@ -30,7 +30,6 @@ from hystgen.effects.lag.compensator import (
 )
 from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import zero
 
 EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which rounding cannot stall."""

@@ -19,13 +19,13 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import jit, zero
 from hystgen.effects.base import Array, Effect, decays
 from hystgen.effects.part import Function, late
 from hystgen.effects.plays import DASHPOT, DILATED, ONE, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
 from hystgen.plays.loop import State
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import Reals
 
 
 class Movement:

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.jit import Scalar, jit, zero
 from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
-from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**20
 """Samples of a free oscillation that are summed one by one; the remainder has a common bound."""

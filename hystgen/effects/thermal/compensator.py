@@ -9,8 +9,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, N, Scalar, inside, jit
-from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, firsts, memory_of
+from hystgen.basics.jit import Answer, N, Scalar, inside, jit, zero
+from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, added, firsts, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import (
     FLOATING,
@@ -23,7 +23,7 @@ from hystgen.effects.gains import (
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import B, BlockKind, Constants, Rows, added, numbered
+from hystgen.effects.kinds import B, BlockKind, Constants, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -39,7 +39,7 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, zero
+from hystgen.plays.slots import Counts
 
 # ---------------------------------------------------------------- gain.c
 
