@@ -136,6 +136,7 @@ class FixedForm(Form):
             ("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search"),
             ("NEAR", operand(plays.near), "least change of the sum with half a step of the input"),
             ("RATE_BITS", f"{plays.rate_bits}u", "of steps of the input per change of the sum, below one"),
+            ("FASTEST", operand(moving.FASTEST), "the largest such rate"),
             ("SECANTS", f"{moving.SECANTS}u", "tries of a search by secants, before those by halving"),
         ]
         if plays.scanned:

@@ -101,7 +101,7 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);
     }
-    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
+    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
     hystgen_operator_move(self, w, self->search.found);
 #else
     hystgen_operator_release(self, w);
@@ -154,7 +154,7 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
 #ifdef HYSTGEN_INVERSE
-    self->search.rate = self->moving ? self->search.rate : INT32_MAX;
+    self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
 #endif
     hystgen_operator_move(self, w);
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS

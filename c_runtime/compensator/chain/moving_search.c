@@ -36,7 +36,7 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
         const hystgen_sum_t gained = hystgen_size(search->found - search->last);
         const hystgen_sum_t some = gained > 1 ? gained : 1;
         const hystgen_sum_t rate = hystgen_quotient(way, some, HYSTGEN_RATE_BITS);
-        const hystgen_sum_t inside = rate > INT32_MAX ? INT32_MAX : rate;
+        const hystgen_sum_t inside = rate > HYSTGEN_FASTEST ? HYSTGEN_FASTEST : rate;
         search->rate = (uint32_t)(inside > 1 ? inside : 1);
     }
 }
