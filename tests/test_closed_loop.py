@@ -592,7 +592,7 @@ TWICE = Bang()
         ({"controller": None}, TypeError, "a loop needs a controller"),
         ({"controller": signal.lti([1.0], [1.0, 0.0])}, TypeError, "the controller is a continuous system"),
         ({"compensator": "inverse"}, TypeError, "the compensator cannot be a part of a loop"),
-        ({"hysteresis": PI}, TypeError, "the hysteresis is not a part"),
+        ({"hysteresis": PI}, TypeError, "the hysteresis cannot be a part"),
     ],
 )
 def test_what_cannot_be_a_loop(change: dict[str, object], error: type[Exception], said: str) -> None:
@@ -627,12 +627,12 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
         (wanted, None, "needs a duration"),
         (wanted, 0.01, "needs a duration"),
         ([1.0], 1.0, "has its own duration"),
-        ([], None, "one finite number per sample"),
-        ([1.0, math.nan], None, "one finite number per sample"),
-        ([[1.0]], None, "one finite number per sample"),
-        ("abc", None, "one finite number per sample"),
-        ([1j, 2.0], None, "one finite number per sample"),
-        (np.array([1j, 2.0]), None, "one finite number per sample"),
+        ([], None, "at least one sample, and all samples must be finite"),
+        ([1.0, math.nan], None, "at least one sample, and all samples must be finite"),
+        ([[1.0]], None, "at least one sample, and all samples must be finite"),
+        ("abc", None, "at least one sample, and all samples must be finite"),
+        ([1j, 2.0], None, "at least one sample, and all samples must be finite"),
+        (np.array([1j, 2.0]), None, "at least one sample, and all samples must be finite"),
     ):
         with pytest.raises(ValueError, match=said):
             loop.run(reference, duration)  # type: ignore[arg-type]
