@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 4780c9d682945a21d0e8853cd03ed4eeca18f2faee522f5c180cf3dbcfafdcdf, without this line
+ * Text: sha256 c56004abeb431f17cc96f4db1f6cb7b722f2ad5abbd55874877e51ad6822b8b1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -16,7 +16,7 @@
  *         similar model with 10 plays
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
- *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length
+ *     inverse step, worst case: 34 multiplications, 60 comparisons (48 + 4 b, b = 3, the bit length
  *         of n), 1 tanh, 2 atanh
  *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
  *         and 120 on a Cortex-M4F, as measured for similar models
@@ -187,7 +187,7 @@ void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_
  * @pre after init; once every sample time, from one context
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD,
  *     TWO_BRANCHES_STATUS_OUTPUT_CLAMPED, TWO_BRANCHES_STATUS_DOMAIN
- * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length of n), 1
+ * @note Cost: at most 34 multiplications, 60 comparisons (48 + 4 b, b = 3, the bit length of n), 1
  *     tanh, 2 atanh
  */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
