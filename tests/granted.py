@@ -178,8 +178,7 @@ STATES = [
     (r"(        self->staying (?:-=|= sum -) [^;]*;\n)", r"\1        WITHIN(self->staying, PLAYS);\n"),
     (r"(    NAME_sum_t sum = [^;]* self->staying;\n)", r"\1    WITHIN(sum, PLAYS);\n"),
     (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\([^;]*;\n)", r"\1        WITHIN(sum, PLAYS);\n"),
-    (r"(    const NAME_bump_t \*c = &NAME_bump\[)(NAME_bump_of\[i\])(\];\n)",  # curve by curve
-     r"    const unsigned int which = \2;\n    /*@ split which; */\n\1which\3"),
+    (r"(    const uint16_t curve = NAME_bump_of\[i\];\n)", r"\1    /*@ split curve; */\n"),  # curve by curve
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
     (r"(        next = search->low \+ [^;]*;\n)", r"\1        WITHIN(next, INPUT);\n"),
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",

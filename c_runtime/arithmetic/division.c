@@ -46,8 +46,8 @@ static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
 }
 
 /* 2^bits x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no
-   less than 2^59 where it is above that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17 y, a 17th off, and
-   each step squares that share. */
+   less than 2^59 where it is above that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17
+   y, with an error of a 17th, and each step squares this relative error. */
 HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y, unsigned int bits) {
     uint32_t number;
     uint32_t divisor;

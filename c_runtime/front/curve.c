@@ -11,6 +11,11 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
+/* y times h = 0 .. 1, in units of 2^-31. */
+static inline int64_t hystgen_part_of(int32_t y, int32_t h) {
+    return ((int64_t)y * h + ((int64_t)1 << 30)) >> 31;
+}
+
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
    coefficients from degree 0, of which all but c_0 fit a word together. */
@@ -33,9 +38,9 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
     coefficient = &coefficient[low * (degree + 1u)];
     int32_t y = coefficient[degree];
     for (i = degree - 1u; i > 0; --i) {
-        y = coefficient[i] + (int32_t)(((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
+        y = coefficient[i] + (int32_t)hystgen_part_of(y, h);
     }
-    return coefficient[0] + (((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
+    return coefficient[0] + hystgen_part_of(y, h);
 }
 
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the

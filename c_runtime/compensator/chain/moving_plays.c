@@ -8,6 +8,13 @@
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
 
+/* Play i at rest with its input at w. */
+static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
+                                      hystgen_play_t w) {
+    return hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]);
+}
+
+#ifndef HYSTGEN_HAS_DASHPOT_PLAYS
 /* Play i after the input of the plays has moved from x to w. Not inlined where that needs less
    stack. */
 #ifdef HYSTGEN_HAS_MOVES_APART
@@ -20,13 +27,6 @@ hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play, hystg
     return hystgen_moved(i, play, x, w);
 }
 
-/* Play i at rest with its input at w. */
-static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
-                                      hystgen_play_t w) {
-    return hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]);
-}
-
-#ifndef HYSTGEN_HAS_DASHPOT_PLAYS
 /* Play i moves while the input of the plays moves from x to w. Returns whether it does. */
 static bool hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t x, hystgen_play_t w) {
     const hystgen_play_t before = play[i];

@@ -42,12 +42,18 @@ static hystgen_signal_t hystgen_braked_way(const hystgen_lag_table_t *t,
 }
 
 /* The largest lead m, up to `lead`, with which the lag gains no more than `size` until the lead is
-   gone: `limit` is 2 size times the lead with which the lag gains in one step what m shrinks by,
-   and the square of m plus `margin`, half of that, is at most `limit`. */
+   gone: the square of m plus `margin`, half of what m shrinks by in a step, is at most a limit, 2
+   size times the lead with which the lag gains in one step what m shrinks by. `once`: that lead in
+   fixed point, where it takes less stack than the limit, which it is in floating point. */
 HYSTGEN_APART_IN_FIXED_BLOCK hystgen_narrow_t hystgen_braked_lead(hystgen_narrow_t size,
                                                                   hystgen_narrow_t lead,
                                                                   hystgen_narrow_t margin,
-                                                                  hystgen_signal_t limit) {
+                                                                  hystgen_narrow_t once) {
+#ifdef HYSTGEN_FIXED
+    const hystgen_signal_t limit = (hystgen_signal_t)2 * size * once;
+#else
+    const hystgen_signal_t limit = once;
+#endif
     hystgen_narrow_t low = size;
     hystgen_narrow_t high = lead;
     unsigned int i;
@@ -130,7 +136,7 @@ HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
     const int32_t most = size <= margin ? hystgen_braked_coarsely(t, size) : size;
     if (most > margin) {
         return hystgen_braked_lead(size, brake->lead, margin,
-                                   (int64_t)2 * size * hystgen_braked_coarsely(t, brake->back));
+                                   hystgen_braked_coarsely(t, brake->back));
     }
     return most;
 }

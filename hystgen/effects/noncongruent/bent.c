@@ -25,7 +25,8 @@ static inline hystgen_real_t hystgen_bent_steep(unsigned int i, hystgen_real_t z
 /* Contribution of play i at z, in fixed point: z plus the value of a curve, which several plays may
    share. Beyond the range of the plays a curve keeps its end value. */
 HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
-    const hystgen_bump_t *c = &hystgen_bump[hystgen_bump_of[i]];
+    const uint16_t curve = hystgen_bump_of[i];
+    const hystgen_bump_t *c = &hystgen_bump[curve];
     int32_t inside = z;
     if (z < -HYSTGEN_BUMP_END) {
         inside = -HYSTGEN_BUMP_END;

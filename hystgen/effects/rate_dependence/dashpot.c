@@ -5,6 +5,7 @@
 #ifndef HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #define HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #include "compensator/chain/model.h"
+#include "compensator/chain/signals.c"
 #include "effects/rate_dependence/yield.c"
 
 /* The input taken as standing still during the move from x to w. */

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 c8b709023fa03a7577cce786e01de936864856286ef49dd480bb023399a70b75, without this line
+ * Text: sha256 8931843aef1a383784af95c386c010212f2d69a35eceb14b4f88be2db7b7e055, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -315,6 +315,11 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
+/* y times h = 0 .. 1, in units of 2^-31. */
+static inline int64_t curved_part_of(int32_t y, int32_t h) {
+    return ((int64_t)y * h + ((int64_t)1 << 30)) >> 31;
+}
+
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
    coefficients from degree 0, of which all but c_0 fit a word together. */
@@ -336,9 +341,9 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
     coefficient = &coefficient[low * (degree + 1u)];
     int32_t y = coefficient[degree];
     for (i = degree - 1u; i > 0; --i) {
-        y = coefficient[i] + (int32_t)(((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
+        y = coefficient[i] + (int32_t)curved_part_of(y, h);
     }
-    return coefficient[0] + (((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
+    return coefficient[0] + curved_part_of(y, h);
 }
 
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the
