@@ -117,7 +117,8 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
         text = (folder / file).read_text(encoding="utf-8").splitlines()
         numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
         own = numbered + "hystgen_operator_t\n" * any("hystgen_operator_t" in line for line in text)
-        chosen = "".join(runtime.forms(own, one.family.facts | one.variant.facts)).splitlines()
+        facts = one.family.facts | one.variant.facts | one.kernel_facts
+        chosen = "".join(runtime.forms(own, facts)).splitlines()
         found |= {(file, int(line)) for line in chosen if line.isdecimal()}
     return found
 
@@ -160,7 +161,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     one = _compensator(name, arithmetic, engine)
     chain, loop = one.variant.chain, one.family.loop
-    facts = one.family.facts | one.variant.facts
+    facts = one.family.facts | one.variant.facts | one.kernel_facts
     types = [*([f'#include "{runtime.CHAIN_TYPES[0]}"'] * chain), *(one.glue.states.values() if one.glue else ())]
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     text = "\n".join(
@@ -168,7 +169,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             "#define HYSTGEN_CONFIGURED",
             *["#define HYSTGEN_CHAIN"] * chain,
             *["#define HYSTGEN_LOOP", "#define HYSTGEN_STATUS_SLEW_LIMITED 16u /* never set */"] * loop,
-            *(f"#define {fact}" for fact in sorted(one.variant.facts)),
+            *(f"#define {fact}" for fact in sorted(one.variant.facts | one.kernel_facts)),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {one.corners}",
             *interface.limits(one),

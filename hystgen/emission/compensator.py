@@ -423,6 +423,12 @@ class EmittedModel:
         return measured(self.compiled, chain, how)
 
     @property
+    def kernel_facts(self) -> frozenset[str]:
+        """What the kernels know of the model: only an inverse of plays alone solves for drives at a limit."""
+        limited = self.options.inverse and not (self.variant.fronts or self.variant.chain)
+        return frozenset() if limited else frozenset({"HYSTGEN_HAS_NO_LIMIT"})
+
+    @property
     def units(self) -> UnitTexts:
         """Units of drive and output."""
         units = self.parameters.units

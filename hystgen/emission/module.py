@@ -122,8 +122,8 @@ def composed(one: EmittedModel) -> Code:
     pieces = runtime.operator_pieces(one.variant, operators, front(one), one.calls, own_functions)
     called = sorted(runtime.used(pieces))
     shared = one.options.layout == "shared-runtime"
-    limits = shared or ("inverse" in operators and not (one.variant.fronts or one.variant.chain))
-    kernels = runtime.needed([*runtime.table_pieces(family), *runtime.kernel_pieces(family, limits)], called)
+    kernels = runtime.kernel_pieces(family, frozenset() if shared else one.kernel_facts)
+    kernels = runtime.needed([*runtime.table_pieces(family), *kernels], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
     tables: list[runtime.Piece] = []

@@ -542,9 +542,9 @@ def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
     return [piece for file in files for piece in _pieces_of(file, frozenset(facts))]
 
 
-def kernel_pieces(family: Family, limits: bool = True) -> list[Piece]:
-    """Every piece of every kernel file of an arithmetic, callees before callers; `limits`: also for limited plays."""
-    return _pieces(family.kernel_files, family.facts if limits else family.facts | {"HYSTGEN_HAS_NO_LIMIT"})
+def kernel_pieces(family: Family, facts: frozenset[str] = frozenset()) -> list[Piece]:
+    """Every piece of every kernel file of an arithmetic, callees before callers; `facts`: of the model."""
+    return _pieces(family.kernel_files, family.facts | facts)
 
 
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
