@@ -154,8 +154,8 @@ class Formula:
 def _power(base: mpf, exponent: mpf) -> mpf:
     """`base**exponent`. Raises ValueError where it is not real.
 
-    A large exponent is handled by the logarithm, with the extra bits that this costs: an integer power would take up to
-    a thousand squarings of ever longer numbers.
+    A power with a large exponent is computed from the logarithm, with extra bits to make up for its loss: an integer
+    power would take up to a thousand squarings of ever longer numbers.
     """
     mp = _context()
     if abs(exponent) <= _LARGE_POWER or base == 0:

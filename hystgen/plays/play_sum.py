@@ -40,7 +40,7 @@ def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> 
     for i in range(2, n + 1):
         reach = thresholds[i] - thresholds[i - 1]
         states.append(min(max(float(requested[i]), states[-1] - reach), states[-1] + reach))
-    # sums of decimal numbers are inexact by rounding, which does not count as a projection
+    # rounding in sums of decimal numbers does not count as a projection
     grain = 8 * np.finfo(np.float64).eps
     moved = any(
         abs(a - float(b)) > grain * max(abs(a), abs(float(b)), r)
