@@ -153,7 +153,7 @@ class About:
     timed: bool = True
     """whether the records' times are known"""
     output: tuple[float, float] = (0.0, 0.0)
-    """least and largest measured output of all records"""
+    """smallest and largest measured output of all records"""
 
 
 @dataclass(frozen=True)
@@ -253,8 +253,8 @@ class Effect(BaseModel):
     compensation: ClassVar[str] = ""
     """how it does so, in one clause"""
     mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {}
-    """warnings about an inverse where records could not tell the effect from another one: by the name of the other, in
-    case the other was chosen, and in case this effect was"""
+    """warnings about the inverse if the records could not tell the effect from another, by the other's name: one in
+    case the other was chosen, one in case this effect was"""
     shown_by: ClassVar[Mapping[str, int]] = {}
     """planned records that show it, and its rank among the effects that each record shows, 1 for the most visible"""
     rank: ClassVar[float] = math.inf
@@ -375,7 +375,7 @@ class Block(ABC):
 
     @abstractmethod
     def call(self, verb: str, x: float) -> float:
-        """The result of a verb below for x."""
+        """Apply one of the verbs below to x."""
 
     def resting(self, y: float) -> float:
         """The input that gives the output `y` once everything has settled."""

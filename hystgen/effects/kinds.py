@@ -101,7 +101,7 @@ def numbered(kind: BlockKind, absorb: int, solve: int = 0, each: int = 0) -> Cal
 
 
 def product(number: Any, x: Any) -> Any:
-    """A table entry times x in a user's own block; in C, `hystgen_product(&t->number, x)`."""
+    """The product of a table entry and x in a user's own block; in C, `hystgen_product(&t->number, x)`."""
     return number * x
 
 

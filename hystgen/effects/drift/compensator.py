@@ -29,10 +29,10 @@ class ClockTable(Struct):
 
 
 class ClockNumbers(ClockTable):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
     one: Real
-    most_ahead: Real  # samples by which references are ahead at most
+    most_ahead: Real  # largest number of samples by which references are ahead
 
 
 class ClockState(Struct):
@@ -97,7 +97,7 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
 
     @jit
     def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Scalar:
-        """The drift by the time of the newest reference."""
+        """The drift at the time of the newest reference."""
         late = s.lead[j] if filled else zero(t.one[j])
         return drift(t, s, j, late + t.one[j] if moving else late)
 
