@@ -79,7 +79,7 @@ class Discretisation:
 
     `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output units;
     beyond R the slopes differ only by rounding. `output_error` bounds the output's error for every drive and history
-    that keep the plays within R of zero; further out, the rounding of the weights counts in proportion to the plays.
+    that keep the plays within R of zero; further out, rounding of the weights adds an error in proportion to the plays.
     """
 
     thresholds: tuple[float, ...]

@@ -67,7 +67,7 @@ class StepState(Struct):
     stepped: Flag  # a step has answered
     committed: Flag  # a drive has been committed since
     repeated: Flag  # the last answer is still valid for `reference`
-    usual: Flag  # in the last step the same plays followed
+    usual: Flag  # the last step took the fast path: the same plays followed
     sought: Flag  # a solution has been found since the plays last followed
     bits: UInt32  # status of the last answer
     status: UInt32
