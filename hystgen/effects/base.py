@@ -192,7 +192,7 @@ Problem = tuple[tuple[str | int, ...], str]
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-    """The problem of an effect that needs plays with a threshold, if the model has none."""
+    """A problem unless the model has plays with a threshold, which an effect needs."""
     if thresholds is not None and len(thresholds) < 2:
         yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
@@ -200,14 +200,14 @@ def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
 def not_one_a_play(
     key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
 ) -> Iterator[Problem]:
-    """The problem of a key that does not have one of `what` for each play with a threshold."""
+    """A problem unless a key has one of `what` for each play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
         counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
 
 
 def not_as_many(key: str, values: Sequence[object], other: str, others: Sequence[object]) -> Iterator[Problem]:
-    """The problem of a key that does not have as many values as another key."""
+    """A problem unless a key has as many values as another key."""
     if len(values) != len(others):
         yield (key,), f"has {counted(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
 

@@ -52,9 +52,9 @@ class BlockKind:
     """One kind of block in one arithmetic.
 
     `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, in C preceded by a pointer to its
-    `rows` if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it has;
-    without `rest`, absorb also settles it, without `resting`, solve also serves at rest; `like`: the kind whose table
-    type it shares.
+    `rows` if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it
+    defines; without `rest`, absorb also settles it, without `resting`, solve also serves at rest; `like`: the kind
+    whose table type it shares.
     """
 
     name: str

@@ -43,7 +43,7 @@ class Wanted(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """Units in fixed point: of a signal, in output codes, and of an output code; and the largest output, in codes."""
+    """Units in fixed point: a signal in output codes, and an output code (`lsb`); and the largest output in codes."""
 
     signal: float
     lsb: float

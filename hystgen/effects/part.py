@@ -70,9 +70,9 @@ class Verbs:
 
     `reset`: to the parameter file's state; `move`: the drive has moved from one value to another in one sample;
     `set_*`: set a number from the caller, and return whether it had to be limited; `travelled`: the travel, from the
-    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag whether it is
-    not the first; `ahead`: addition to the displacement at the newest reference's time, with flags whether there is a
-    reference, and whether the drive has moved. `led`: for a block in front of the plays that may be led.
+    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag for any but
+    the first; `ahead`: addition to the displacement at the newest reference's time, with flags for whether there is a
+    reference and whether the drive has moved. `led`: for a block in front of the plays that may be led.
     """
 
     memory: Callable[..., object]
@@ -386,8 +386,8 @@ class ChainPart:
     into one in C; `coded`: loads its fixed-point version, for models in fixed point.
 
     `longest`: the longest travel that can be set, from its tables. `problems`: why the C cannot include an effect;
-    `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
-    how many of each its tables contain, by default its blocks.
+    `unmeasured`: set if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and
+    `counted`: how many of each its tables contain, by default its blocks.
 
     In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of an effect
     behind the plays that depends on the drive; `no_inverse`: why there is no inverse.

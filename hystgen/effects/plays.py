@@ -156,8 +156,8 @@ class Bent(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """The functions of moving plays in one arithmetic, of the tables m, thresholds r, the index i of a play, the memory
-    s of all plays, their rounding remainders and their input w.
+    """The functions of moving plays in one arithmetic; arguments: the tables m, thresholds r, the index i of a play,
+    the memory s of all plays, their rounding remainders and their input w.
 
     `moved`: play i after its input has gone to w; `move`: moves it there, returns whether it moves; `put`: puts it to
     rest at a position; `rest`: where it would come to rest with its input held; `tried`, in floating point: whether it

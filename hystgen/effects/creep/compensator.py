@@ -199,7 +199,7 @@ def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):

@@ -167,7 +167,7 @@ def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int
 
 @jit
 def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.block.before[j]
     direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])
     total = zero(x)

@@ -103,7 +103,7 @@ def verbs(product: Answer) -> Verbs:
 
     @jit
     def absorb(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """Take the drive v of this sample. Returns the delayed drive."""
+        """Absorb the drive v of this sample. Returns the delayed drive."""
         delay_put(line, v)
         return delayed(t, line)
 

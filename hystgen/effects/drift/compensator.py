@@ -20,7 +20,7 @@ CARRY_SAMPLES = 2.0**24
 class ClockTable(Struct):
     """Drift over time: its rate, and half the change of the rate per second."""
 
-    sample: Real  # duration in s of one sample, and of `carry` of them
+    sample: Real  # duration in s of one sample, and of a block of `carry` samples
     block: Real
     carry: Real
     rate: Real
@@ -38,7 +38,7 @@ class ClockNumbers(ClockTable):
 class ClockState(Struct):
     """A clock."""
 
-    high: Real  # samples, in units of the table's carry and of one
+    high: Real  # samples counted: full blocks of `carry`, and those since
     low: Real
     lead: Real  # samples by which the next reference is ahead
 

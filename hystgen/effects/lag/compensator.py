@@ -275,7 +275,7 @@ def lag_solve(t: LagTables, s: LagMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     if t.exact[j]:
         reached = s.inverted.reached[j]
         given = t.inverted.early[j] * s.inverted.before[j] + t.inverted.late[j] * x

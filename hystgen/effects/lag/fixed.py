@@ -203,7 +203,7 @@ def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
 
 @jit
 def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     if t.exact[j]:
         late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
         reached = s.inverted.next[j] + late

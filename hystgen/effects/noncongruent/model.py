@@ -158,8 +158,8 @@ class LoopCentre(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre within the drive, width; tried if a cubic explains a part of the error. A search starts at
-        the bump of the cubic's density: from far away it would not find the position.
+        """Amplitude, centre within the drive range, width; tried if a cubic explains part of the error. A search starts
+        at the bump of the cubic's density: from far away it would not find the position.
         """
         if len(about.thresholds) < 2:
             return []

@@ -131,7 +131,7 @@ def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa:
 
 @jit
 def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]

@@ -109,7 +109,7 @@ def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
 
 @jit
 def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]

@@ -353,7 +353,7 @@ def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
     widths = thresholds(effect, speed.ends)
     if not widths:
         return 0.0
-    # each play is off by one rounding, or by three if it stays because another play does
+    # a play is off by one rounding, or by three if it stays only because another one does
     amount = len(widths) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + widths[-1])
     amount += (len(widths) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
     found = amount * per_amount(effect, speed.ends, speed.seconds)
@@ -412,7 +412,7 @@ def heat_way(before: N, v: N) -> N:
 
 @jit
 def warmed(t: HeatNumbers, s: HeatState, j: int, amount: Scalar) -> Scalar:
-    """Take the heat of a step. Returns the temperature rise."""
+    """Absorb the heat of a step. Returns the temperature rise."""
     return added(s, j, t.per_amount[j] * amount - t.rate[j] * s.high[j])
 
 

@@ -245,7 +245,7 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
 
 @jit
 def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
-    """Take the heat of a step. Returns the temperature rise without its lowest bits."""
+    """Absorb the heat of a step. Returns the temperature rise without its lowest bits."""
     warmer = times(nearest(amount, t.coarse[j]), t.per_amount.mantissa[j], t.per_amount.shift[j]) << t.lift[j]
     lost = times(s.high[j] >> t.drop[j], t.rate.mantissa[j], t.rate.shift[j])
     s.high[j] = s.high[j] + (warmer - lost)
