@@ -326,7 +326,7 @@ class FixedSurroundings(Surroundings):
 @dataclass(frozen=True)
 class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
-    fixed point the tables are made from `formats` of a block, the surroundings, and the largest input and output.
+    fixed point the tables are made from the `formats` of each block, for its surroundings, largest input and output.
 
     `kinds`: of its C; `beside`: constants of an additional struct for each block; `degrees`: the temperature, degC, at
     which its gain holds, from its tables.

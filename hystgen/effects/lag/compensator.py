@@ -141,7 +141,7 @@ def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | No
 def shifted(theta: float, turning: bool = False) -> float:
     """Largest error of a lag's goal, for errors up to 1 of the requested output, if the lag has seen the same drives.
 
-    The previous target follows from the drive that led to it and retains earlier errors, `W = theta^2 + theta (1 -
+    The previous target is computed from the drive that led to it, and retains earlier errors, `W = theta^2 + theta (1 -
     theta) W`. In front of two branches (`turning`) the led move is off by the errors of two targets, or `MOST_LED`
     times those errors.
     """

@@ -160,7 +160,7 @@ LEAST_YIELD = 2.0**-40
 2^28 steps."""
 
 LONGEST = 4.0
-"""Largest ratio of a piece's end to its beginning: even laws steeper than a dashpot's are cubic over two octaves."""
+"""Largest ratio of a piece's end to its beginning: over two octaves a cubic fits even laws steeper than a dashpot's."""
 
 YIELD_ERROR = 1e-3
 """Largest relative error of the loss of a stretch: the relative error of plays' lag behind their input is
@@ -247,8 +247,8 @@ def stretch_error(
     """Largest difference between the stretches of plays by the table and by the law.
 
     `ways`: the largest move of the input in a step, and overall; `held` (K,): rounding error of the loss on each piece.
-    Of two plays, one by the law and one by the table, neither gains on the other once it is stretched by that much
-    less.
+    If one play follows the law and another the table, neither gains on the other once it is stretched less by that
+    much.
     """
     end = LONGEST * rows[-1, BEGIN] if len(rows) > 1 else LEAST_STRETCH * scale
     x = np.append(0.0, np.geomspace(1e-3 * (rows[1, BEGIN] if len(rows) > 1 else end), end, 6000))
