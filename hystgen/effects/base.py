@@ -258,8 +258,7 @@ class Effect(BaseModel):
     shown_by: ClassVar[Mapping[str, int]] = {}
     """planned records that show it, and its rank among the effects that each record shows, 1 for the most visible"""
     rank: ClassVar[float] = math.inf
-    """order of effects that explain records equally well: a lag or delay, which every drive has, before plays that
-    lag"""
+    """order of effects that explain records equally well: a lag or delay, as in every drive, before plays that lag"""
     from_start: ClassVar[bool] = False
     """whether it depends on the time since the first sample"""
     block: ClassVar[OwnBlock | None] = None
