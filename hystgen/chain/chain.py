@@ -26,7 +26,7 @@ VISIT_SAMPLES = 200
 of its range; only 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
-"""Gap between records of a session, in median steps, above which the drive is held; in shorter gaps it is linear."""
+"""[median steps] In longer gaps between records of a session the drive is held; in shorter ones it is linear."""
 
 def rank(effect: Effect | type[Effect]) -> tuple[int, int]:
     """Position in the chain: place, then order; gains lie between the linear filters of order 0 and the others."""
@@ -107,7 +107,7 @@ rounding makes evenly spaced times, and thus the lag's factors, differ. Set by: 
 
 
 def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Largest move back of the signal in front of the memoryless part that keeps the branch, in drive units."""
+    """Largest reversal in front of the memoryless part that does not switch its branch, in drive units."""
     if not static.branches_differ or not any(effect.place is Place.DRIVE for effect in effects):
         return 0.0
     largest = max(abs(end) for end in static.input_range)
@@ -120,7 +120,7 @@ class Ordered:
     effects: tuple[Effect, ...]
 
     def at(self, place: Place) -> Sequence[Effect]:
-        """The effects at one place of the chain, in its order."""
+        """The effects at one place, in the order of the chain."""
         return self._at.get(place, ())
 
     @cached_property
@@ -229,7 +229,7 @@ class Chain(Ordered):
         return [y[part] for part in session.parts]
 
     def output(self, run: Run) -> Array:
-        """Output (N,) of one run, at rest in the start memory at its first sample."""
+        """Output (N,) of one run that starts at rest in the start memory."""
         y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
         for effect in self.filters:
             y = effect.filtered(y, run)
@@ -252,8 +252,8 @@ class Chain(Ordered):
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) that the weights multiply, from the start memory on: plays, moved by at most one effect and
-        bent by the others."""
+        """Rows (n+1, N) to be weighted, from the start memory on: plays, moved by at most one effect and bent by any
+        others."""
         pi = self.cascade.pi
         thresholds = np.asarray(pi.thresholds)
         return self.bent(self.moved(w, run, thresholds, np.asarray(pi.start)), thresholds)

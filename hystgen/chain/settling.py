@@ -30,14 +30,14 @@ CLOSE, FINE = 0.03, 3e-4
 """[fractions of the error and of the step] Limits on the output's deviation from a straight line between samples."""
 
 GOLDEN = 0.381966011250105
-"""[fraction of an interval] Point compared with the straight line: the middle can be whole periods from both ends."""
+"""[fraction of an interval] Point compared with the straight line; the middle may be whole periods from both ends."""
 
 GRADED = 4.0
 """Largest ratio of an interval to its neighbour: an oscillation that happens to cross zero at the test point of one
 interval is found in the next."""
 
 NARROWEST = 1e-6
-"""[fraction of the time since the step] Shorter intervals are not split: the edge behind a delay stays an edge."""
+"""[fraction of the time since the step] Shorter intervals are not split, or the edge behind a delay would split on."""
 
 MOST_SAMPLES = 2**18
 """Maximum number of samples of a response; a mode with a damping of 0.001 takes a third of it."""
@@ -52,8 +52,8 @@ class Settling:
 
     `within`: the tolerated error as a fraction of the output's final step; `error`: the same in output units; `up`,
     `down`: settling times in s after a step to the upper or lower end of the range, 0 if the output settles at once,
-    inf if not within `followed` s; `because`: the effects that take the time; `left_out`: effects independent of the
-    drive.
+    inf if not within `followed` s; `because`: the effects responsible for the time; `left_out`: effects independent of
+    the drive.
     """
 
     within: float

@@ -124,8 +124,8 @@ class StaticModel:
         """The output at each end of `input_range` after a move from the other end; never outside `output_range`.
 
         Once the drive has been at one end, references between the swung output at the other end and the limit of
-        `output_range` there need a drive out of range. Plays that begin at 0, as after a reset, count if their range is
-        narrower.
+        `output_range` there need a drive out of range. If plays that begin at 0, as after a reset, have a narrower
+        range, theirs is used.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))

@@ -55,7 +55,7 @@ TOLD_APART = {
 """Experiments that separate two effects."""
 
 Unmeasured = Literal["drift", "self_heating"]
-"""What a compensator follows open loop if the user requests it, since nothing measures it."""
+"""Quantities that nothing measures, which a compensator follows open loop if the user requests it."""
 
 
 def _catalogue() -> tuple[str, ...]:

@@ -153,7 +153,7 @@ class About:
     timed: bool = True
     """whether the records' times are known"""
     output: tuple[float, float] = (0.0, 0.0)
-    """least and largest measured output of all records"""
+    """smallest and largest measured output of all records"""
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ Problem = tuple[tuple[str | int, ...], str]
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-    """The problem of an effect that needs plays with a threshold, if the model has none."""
+    """A problem unless the model has plays with a threshold, which an effect needs."""
     if thresholds is not None and len(thresholds) < 2:
         yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
@@ -200,14 +200,14 @@ def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
 def not_one_a_play(
     key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
 ) -> Iterator[Problem]:
-    """The problem of a key that does not have one of `what` for each play with a threshold."""
+    """A problem unless a key has one of `what` for each play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
         counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
 
 
 def not_as_many(key: str, values: Sequence[object], other: str, others: Sequence[object]) -> Iterator[Problem]:
-    """The problem of a key that does not have as many values as another key."""
+    """A problem unless a key has as many values as another key."""
     if len(values) != len(others):
         yield (key,), f"has {counted(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
 
@@ -253,12 +253,12 @@ class Effect(BaseModel):
     compensation: ClassVar[str] = ""
     """how it does so, in one clause"""
     mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {}
-    """warnings about an inverse where records could not tell the effect from another one: by the name of the other, in
-    case the other was chosen, and in case this effect was"""
+    """warnings about the inverse if the records could not tell the effect from another, by the other's name: one in
+    case the other was chosen, one in case this effect was"""
     shown_by: ClassVar[Mapping[str, int]] = {}
     """planned records that show it, and its rank among the effects that each record shows, 1 for the most visible"""
     rank: ClassVar[float] = math.inf
-    """order of effects that explain records equally well: a lag or delay, which every drive has, before late plays"""
+    """order of effects that explain records equally well: a lag or delay, as in every drive, before plays that lag"""
     from_start: ClassVar[bool] = False
     """whether it depends on the time since the first sample"""
     block: ClassVar[OwnBlock | None] = None
@@ -375,7 +375,7 @@ class Block(ABC):
 
     @abstractmethod
     def call(self, verb: str, x: float) -> float:
-        """The result of a verb below for x."""
+        """Apply one of the verbs below to x."""
 
     def resting(self, y: float) -> float:
         """The input that gives the output `y` once everything has settled."""

@@ -1,4 +1,4 @@
-"""Curves between signals in fixed point, as pieces of polynomials: `maps.c`."""
+"""Curves from signal to signal in fixed point, as piecewise polynomials: `maps.c`."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class BendPiece(Protocol):
 
 
 class Bends(NamedTuple):
-    """Curves (k,) as in `hystgen.compensator.layout.FixedTables`; `scaled` (k, 2): bits dropped from a signal for the
-    argument, and for the value."""
+    """Curves (k,) as in `hystgen.compensator.layout.FixedTables`; `scaled` (k, 2): right shift from a signal to the
+    argument, and left shift from the value to a signal."""
 
     knot: Reals
     coefficient: Reals
@@ -43,7 +43,7 @@ def bends(
     pieces: Sequence[Sequence[BendPiece]], domain: Sequence[tuple[int, int]], scaled: Sequence[tuple[int, int]],
     degree: int,
 ) -> Bends:
-    """The tables of curves up to a degree; a curve that is not needed has no pieces."""
+    """Tables of curves up to `degree`; a curve that is not needed has no pieces."""
     flat = list(itertools.chain.from_iterable(pieces))
     first = [0, *itertools.accumulate(map(len, pieces))][: len(pieces)]
 
@@ -60,7 +60,7 @@ def bends(
 
 @jit
 def bend(t: Bends, which: int, x: int) -> tuple[int, int]:
-    """The value of a curve at x, and whether x had to be limited to its ends."""
+    """The value of a curve at x, and whether x had to be limited to the curve's ends."""
     argument = nearest(x, t.scaled[which, 0])
     within = inside(argument, t.domain[which, 0], t.domain[which, 1])
     return curve(t, which, within) << t.scaled[which, 1], 1 if within != argument else 0

@@ -14,7 +14,7 @@ LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 unit. Set by fixed point: with `GAIN_BITS` fraction bits, 2 is the limit of a gain and of its reciprocal."""
 
 MOST_CHANGE = 0.25
-"""[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
+"""[fraction of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
 reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six steps in every
 sample, a limit of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
 
@@ -24,17 +24,17 @@ GAIN_BITS = 29
 ONE = 1 << GAIN_BITS
 
 RECIPROCAL_ERROR = 4.0 * 2.0**-GAIN_BITS
-"""[share of the signal] Error of the reciprocal of a gain of at least 1/2 that is off by its last bit: twice the gain's
-error, plus that of a Newton step."""
+"""[fraction of the signal] Error of the reciprocal of a gain of at least 1/2 that is off by its last bit: twice the
+gain's error, plus that of a Newton step."""
 
 
 def too_fast(change: float) -> str:
-    """Why the C cannot follow a gain that changes by a share `change` in one move over the range."""
+    """Why the C cannot follow a gain that changes by a fraction `change` in one move over the range."""
     return f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
 
 
 def newton_steps(change: float, roundoff: float) -> int:
-    """Newton steps that make the reciprocal exact up to rounding after the gain has changed by a share `change`."""
+    """Newton steps that make the reciprocal exact up to rounding after the gain has changed by a fraction `change`."""
     left = max(change, 1e-9)
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
@@ -44,8 +44,8 @@ def newton_steps(change: float, roundoff: float) -> int:
 
 class Gains(NamedTuple):
     """How an arithmetic computes with gains: the product of a signal and a gain, and of two gains; the reciprocal of a
-    gain, from the gain 1; the product of a signal and factor j of a table; a setting, or any number in floating point,
-    as a number of block j; and an action that sets what a block counts, in floating point in two parts.
+    gain, from the gain 1; the product of a signal and factor j of a table; a caller's setting (in floating point any
+    number) as a number of block j; and an action that sets a block's running sum (in floating point two parts).
 
     `limits`: numbers as in `GainLimits`.
     """
@@ -137,7 +137,7 @@ def _fixed_put(s: TwoParts, j: int, x: int) -> None:
 
 
 class _Coded(Protocol):
-    """A table with the bits of a number below the code that sets it."""
+    """A table with the left shift from a caller's code to a number of a block."""
 
     bits: NumberArray
 

@@ -52,9 +52,9 @@ class BlockKind:
     """One kind of block in one arithmetic.
 
     `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, in C preceded by a pointer to its
-    `rows` if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it has;
-    without `rest`, absorb also settles it, without `resting`, solve also serves at rest; `like`: the kind whose table
-    type it shares.
+    `rows` if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it
+    defines; without `rest`, absorb also settles it, without `resting`, solve also serves at rest; `like`: the kind
+    whose table type it shares.
     """
 
     name: str
@@ -101,7 +101,7 @@ def numbered(kind: BlockKind, absorb: int, solve: int = 0, each: int = 0) -> Cal
 
 
 def product(number: Any, x: Any) -> Any:
-    """A table entry times x in a user's own block; in C, `hystgen_product(&t->number, x)`."""
+    """The product of a table entry and x in a user's own block; in C, `hystgen_product(&t->number, x)`."""
     return number * x
 
 

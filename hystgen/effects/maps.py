@@ -1,5 +1,5 @@
-"""Memoryless maps of the output, behind everything with a memory: what such an effect tells a compensator, and its
-functions in fixed point, curves made of polynomials or linear pieces."""
+"""Memoryless maps of the output, behind everything with a memory: what a compensator needs to know of such an effect,
+and its functions in fixed point, curves made of polynomials or linear pieces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
 
 
 class MapErrors(NamedTuple):
-    """Errors of maps from the last one on: the ends of the output in front of them, the slope of their inverse there,
+    """Errors of the last maps of a chain: the ends of the output in front of them, the slope of their inverse there,
     the error of that inverse in terms of its result, and the error of the maps."""
 
     ends: Array
@@ -28,7 +28,7 @@ class MapErrors(NamedTuple):
 
 
 class FittedCurve(Protocol):
-    """A curve as fitted in fixed point: its error in signals, for the largest slope."""
+    """A curve fitted in fixed point; `error`: its error in signals, given its largest slope."""
 
     def error(self, slope: float, /) -> float: ...
 
@@ -43,7 +43,7 @@ class Wanted(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """Units in fixed point: of a signal, in output codes, and of an output code; and the largest output, in codes."""
+    """Units in fixed point: a signal in output codes, and an output code (`lsb`); and the largest output in codes."""
 
     signal: float
     lsb: float
@@ -85,7 +85,7 @@ class Map:
     def asked(
         self, back: float, ends: tuple[float, float], still: float, lsb: float
     ) -> tuple[float, tuple[float, float] | None]:
-        """Largest input that an output of magnitude up to `back` gives, and the least and largest if a curve inverts;
+        """Largest input for outputs of magnitude up to `back`, and the ends of the input if a curve inverts the map;
         `ends`: of the settled input, `still`: its largest magnitude."""
         return back / self.give if self.give else max(abs(self.lower), abs(self.upper)) / lsb, None
 
@@ -107,7 +107,7 @@ class Map:
 
 @dataclass(frozen=True)
 class MapPart:
-    """Effects that map the output: `takes` tells whether an effect is such an effect, and `of` makes its map."""
+    """Effects that map the output: `takes` tells whether an effect is one of them, and `of` makes its map."""
 
     takes: Callable[[Effect], bool]
     of: Callable[..., Map]

@@ -5,7 +5,7 @@
     def solve(t, s, y): ...     the input that gives the output y at this sample
     def absorb(t, s, x): ...    the input is x at this sample; returns the output
 
-`t` holds the block's parameters, `s` its memory, arrays that these functions index. They run unchanged in double
+The functions index two arrays: `t`, the block's parameters, and `s`, its memory. They run unchanged in double
 precision, and compiled as the bit reference of the C in each arithmetic, so they use only +, - and `product(t[..],
 ..)`: a literal would not have the precision of the C.
 """
@@ -34,7 +34,7 @@ ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
 """Number of arguments of each function."""
 
 NAME = re.compile(r"user:([a-z][a-z0-9_]{0,30})")
-"""Names of effects after which a block can be named in C."""
+"""Names of effects from which the C name of a block can be made."""
 
 WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 """Names of a block's parameters and states, which are also their names in C."""
@@ -89,7 +89,7 @@ def _failed(effect: Effect, function: str, error: Exception) -> EffectsError:
 
 
 class Instance(Block):
-    """The block of a user's own effect in double precision; it caches the parameters of a step length."""
+    """The block of a user's own effect in double precision; it caches the parameters per step length."""
 
     def __init__(self, effect: Effect) -> None:
         assert effect.block is not None
@@ -111,7 +111,7 @@ class Instance(Block):
             raise _failed(self.effect, verb, error) from error
 
 
-# ---------------------------------------------------------------- what is wrong with one
+# ---------------------------------------------------------------- faults of a block
 
 
 def _name(effect: type[Effect]) -> str:
@@ -141,7 +141,7 @@ def problem(effect: type[Effect]) -> str:
 
 @functools.cache
 def check(effect: type[Effect]) -> None:
-    """Raise EffectsError, one line `FILE:LINE: what; do` a fault, if a block cannot be the bit reference of its C."""
+    """Raise EffectsError, a line `FILE:LINE: what; do` per fault, if a block cannot be the bit reference of its C."""
     assert effect.block is not None
     if wrong := problem(effect):
         raise EffectsError(f"the effect {_name(effect)} {wrong}")

@@ -21,10 +21,10 @@ Function = Callable[..., Any]
 
 
 class Led(NamedTuple):
-    """How to lead the only block in front of the plays if the blocks behind it depend on its path: its state, the input
-    for an output, the input that is kept, absorbing an input, the shortfall of a move in its first sample; and the
-    input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in fixed point
-    among numbers up to `coarse`."""
+    """How to lead the only block in front of the plays if the blocks behind it depend on its path. `state`: its state;
+    `solve`: the input for an output; `kept`: an input that does not turn it back; `absorb`: notes its move; `missed`:
+    how far it falls short of a move in the first sample; `braked`: the input that does not overshoot behind a slew
+    limit, found by `halves` halvings in floating point, and in fixed point among numbers up to `coarse`."""
 
     state: Answer
     solve: Callable[..., tuple[Scalar, Scalar]]
@@ -39,8 +39,8 @@ class Led(NamedTuple):
 @runtime_checkable
 class Leading(Protocol):
     """The block that `Led` leads, in double precision. `rises`: the direction of arrival, in front of two branches;
-    with `always_led` it is then led however short a step is; `exact`: whether it is inverted exactly in this step;
-    `patience`: the share of the distance to the other branch by which it falls short in the first sample of a turn;
+    with `always_led` it is led however long a step is; `exact`: whether it is inverted exactly in this step;
+    `patience`: the fraction of the distance to the other branch by which it falls short in the first sample of a turn;
     `braked`: the drive at which it does not overshoot, from the nearest reachable drive, `short` of the answer."""
 
     rises: Callable[[], bool] | None
@@ -70,9 +70,9 @@ class Verbs:
 
     `reset`: to the parameter file's state; `move`: the drive has moved from one value to another in one sample;
     `set_*`: set a number from the caller, and return whether it had to be limited; `travelled`: the travel, from the
-    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag whether it is
-    not the first; `ahead`: addition to the displacement at the newest reference's time, with flags whether there is a
-    reference, and whether the drive has moved. `led`: for a block in front of the plays that may be led.
+    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag for any but
+    the first; `ahead`: addition to the displacement at the newest reference's time, with flags for whether there is a
+    reference and whether the drive has moved. `led`: for a block in front of the plays that may be led.
     """
 
     memory: Callable[..., object]
@@ -99,8 +99,8 @@ class Verbs:
 
 
 class Margin(NamedTuple):
-    """How far signals can exceed their size without rounding: a factor, and the `span` of the output, beyond which no
-    block adds anything; `turning`: blocks behind the led block depend on its direction."""
+    """How far signals can exceed the sizes they have without rounding: by the factor `slack`; `span`: of the output,
+    the most that a block adds; `turning`: blocks behind the led block depend on its direction."""
 
     slack: float
     span: float = 0.0
@@ -108,8 +108,8 @@ class Margin(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """Frequency responses (N,) of the blocks of an inverse: the lead, the share of the target that arrives in front of
-    the plays, the response behind them, its immediate part, and the gain at rest."""
+    """Frequency responses (N,) of the blocks of an inverse: the lead, the fraction of the target that arrives in front
+    of the plays, the response behind them, its immediate part, and the gain at rest."""
 
     led: NDArray[np.complex128]
     arriving: NDArray[np.complex128]
@@ -127,8 +127,8 @@ class Speed(NamedTuple):
 
 
 class Gained(NamedTuple):
-    """A gain behind the plays: its own roundings, its least and largest values, and what it adds to the errors of its
-    output (`there`) and of the requested output (`back`)."""
+    """A gain behind the plays: its number of roundings, its smallest and largest values, and its contributions to the
+    errors of its output (`there`) and of the requested output (`back`)."""
 
     roundings: float
     least: float
@@ -163,7 +163,7 @@ class One:
         return False
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs up to `size`, and of the inverse."""
+        """Rounding errors of the output for inputs up to `size`, and of the inverse."""
         return 0.0, 0.0
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
@@ -220,8 +220,8 @@ class One:
 
 
 class CodedGain(NamedTuple):
-    """A gain in fixed point: its least and largest values, what it adds to the errors of its output and of its inverse
-    in output codes, without their final rounding, and the largest offset."""
+    """A gain in fixed point: its smallest and largest values, its contributions to the errors of its output and of its
+    inverse in output codes, without their final rounding, and the largest offset."""
 
     least: float
     largest: float
@@ -239,8 +239,8 @@ class Coding(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """The setting in which a block behind the plays is solved: sizes of its input and of the sum asked of the plays,
-    the unit of signals, how far `apart` states behind the play sum and their inputs may be; `same`: they are equal."""
+    """The conditions for solving a block behind the plays: sizes of its input and of the requested play sum, the unit
+    of signals, how far `apart` states behind the play sum and their inputs can be; `same`: they are equal."""
 
     size: float
     asked: float
@@ -257,16 +257,16 @@ class Coded:
 
     @property
     def arrived(self) -> float:
-        """Roundings of the output in front of the plays."""
+        """Rounding errors of the output in front of the plays."""
         return 0.0
 
     @property
     def follows(self) -> float:
-        """Share of a change of the input that reaches the output in the same sample."""
+        """Fraction of a change of the input that reaches the output in the same sample."""
         return 1.0
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
+        """Rounding errors of the output for inputs up to `size`, with signals in units of `signal`."""
         return 0.0
 
     def solved(self, error: float, at: Sought) -> float:
@@ -304,7 +304,7 @@ class FloatSurroundings(Surroundings):
 
 @dataclass(frozen=True)
 class FixedSurroundings(Surroundings):
-    """The same in fixed point: units per code, `bits` of signals behind the plays below a code, bits of a code and the
+    """The same in fixed point: units per code, fraction `bits` of signals behind the plays, bits of a code and the
     largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span `farthest` in signals."""
 
     drive_lsb: Fraction
@@ -326,7 +326,7 @@ class FixedSurroundings(Surroundings):
 @dataclass(frozen=True)
 class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
-    fixed point the tables are made from `formats` of a block, the surroundings, and the largest input and output.
+    fixed point the tables are made from the `formats` of each block, for its surroundings, largest input and output.
 
     `kinds`: of its C; `beside`: constants of an additional struct for each block; `degrees`: the temperature, degC, at
     which its gain holds, from its tables.
@@ -342,8 +342,8 @@ class Realized:
 
 
 class Setting(NamedTuple):
-    """The data on which depends whether the C can include an effect: all effects of its part in order, those up to a
-    slew limit, the operator, the length of a step, the `ends` of the drive's range, and whether it is fixed point."""
+    """The data that decide whether the C can include an effect: all effects of its part in order, those up to a slew
+    limit, the operator, the length of a step, the `ends` of the drive's range, and whether it is fixed point."""
 
     listed: Sequence[Effect]
     slewed: Sequence[Effect]
@@ -369,25 +369,25 @@ def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Any]:
 
 
 def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
-    """A test whether an effect has this name, and passes the test `only` if given."""
+    """A test of whether an effect has this name and, if `only` is given, passes it."""
     return lambda effect: effect.name == name and (only is None or only(effect))
 
 
 def given(place: Place) -> Callable[[Any], bool]:
-    """A test whether an effect has a block of its own, in front of the plays or behind them."""
+    """A test of whether an effect has a block of its own in front of the plays or, for another `place`, behind them."""
     return lambda effect: effect.block is not None and (effect.place is Place.DRIVE) == (place is Place.DRIVE)
 
 
 @dataclass(frozen=True)
 class ChainPart:
     """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether an effect has this
-    kind of block; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
-    interface that it serves; `forward`: only the forward operator has it; `joined`: all its blocks are one in C;
-    `coded`: loads its fixed-point version, for models in fixed point.
+    kind of block; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`:
+    interface calls that it serves; `forward`: only the forward operator has it; `joined`: all its blocks are merged
+    into one in C; `coded`: loads its fixed-point version, for models in fixed point.
 
     `longest`: the longest travel that can be set, from its tables. `problems`: why the C cannot include an effect;
-    `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
-    how many of each its tables contain, by default its blocks.
+    `unmeasured`: set if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and
+    `counted`: how many of each its tables contain, by default its blocks.
 
     In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of an effect
     behind the plays that depends on the drive; `no_inverse`: why there is no inverse.

@@ -1,6 +1,6 @@
-"""Plays that an effect moves or bends in its own way: what such an effect tells a compensator, and its constants.
+"""Plays that an effect moves or bends in its own way: what a compensator needs to know of it, and its constants.
 
-The state of play i is where it would come to rest, and its contribution there. A plain play rests where it is.
+The state of play i is the position at which it would come to rest, and its contribution there. A plain play is at rest.
 """
 
 from __future__ import annotations
@@ -28,27 +28,26 @@ STRAIGHT, POLYNOMIAL, CENTRE = range(3)
     SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, AMPLITUDE, STEEPEST, TANH_CENTRE,
     LEAST_INPUT, LARGEST_INPUT, HALF, ONE, RATE, CLOSE, SEEN,
 ) = range(15)
-"""Places in `MovingTables.number`."""
+"""Indices into `MovingTables.number`."""
 
 NEWTON_TRIES = 8
-"""Tries of a search in floating point by Newton's method, before it halves what is left of its interval: 1 or 2 are
+"""Tries of a search in floating point by Newton's method, before it starts to halve the remaining interval: 1 or 2 are
 enough on smooth references, and 6 after jumps, where 4 are too few and cost 20 tries (benchmarks/chosen_numbers.py
 tries)."""
 
 
 SECANTS = 10
-"""Tries of a search in fixed point by secants, before it halves what is left of its interval. Set by:
+"""Tries of a search in fixed point by secants, before it starts to halve the remaining interval. Set by:
 benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8, some take 25."""
 
 FASTEST = 2**31 - 1
-"""Largest rate: product with a word fits 63 bits."""
+"""Largest rate: its product with a word fits in 63 bits."""
 
 
 class MovingTables(NamedTuple):
     """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
-    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials;
-    `halves`: halvings of a search that Newton's method leaves unfinished; `turns`: steps to the reciprocal of a
-    slope."""
+    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
+    halvings that finish a search after Newton's method; `turns`: Newton steps for the reciprocal of a slope."""
 
     moves: int
     bends: int
@@ -65,18 +64,17 @@ class MovingTables(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
+        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 class FixedMovingTables(NamedTuple):
     """The same in fixed point. `first`, `second`: factors (n + 1, 2); `farthest`: the largest input that a search
-    tries; `near`: the least that half a step of the input changes the sum by; `rate_bits`: a rate is 2^rate_bits steps
-    of the input per change of the sum, `FASTEST` at the least slope; `relaxed`: tables of plays with the
-    slopes that viscous plays with one time constant have in a step; `bump`: curves of bent plays less the plays
-    themselves, with `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields`
-    (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a
-    factor."""
+    tries; `near`: smallest change of the sum for half a step of the input; `rate_bits`: a rate is 2^rate_bits steps of
+    the input per change of the sum, `FASTEST` at the smallest slope; `relaxed`: tables of plays with the slopes that
+    viscous plays with one time constant have in a step; `bump`: curves of bent plays minus the plays themselves, with
+    `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields` (K, 7): yields of
+    a nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a factor."""
 
     moves: int
     bends: int
@@ -97,14 +95,14 @@ class FixedMovingTables(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
+        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 class Moved(NamedTuple):
     """How plays move at one step length: their kind; `first`, `second` (n,) of plays with a threshold, `yields` and
-    `seen` as in `MovingTables`; how the change of a nonlinear dashpot's play per change of the input varies: most at
-    once, and most per change of the input."""
+    `seen` as in `MovingTables`; `varies`: for a play with a nonlinear dashpot, how its change per change of the input
+    varies: the sum of all jumps, and the most per change of the input."""
 
     moves: int
     first: Array
@@ -121,15 +119,15 @@ class Mover(Protocol):
     """How an effect moves the plays (n + 1) of a model, at steps of any length in double precision.
 
     `after`: the plays after a step in which their input goes straight from `x` to `w`; `numbers`: their constants for
-    drive steps up to `largest_step` and stretches up to `span`; `moves`: their kind; `in_order`: whether none yields
-    faster than one with a smaller threshold; `stood_in_for`: whether others stand in for them, as only the inverse may;
-    `falling`: least change of the sum of those with a threshold per change of their input in one step, at most 0, for
-    contributions that rise by up to `steep` times their play; `responses`: for each number of plays that follow, slope
-    at rest, response (N,) at the factors `z` of a delay by one sample, and the part of it that comes at once;
-    `whole_yields`: the yields in fixed point, for stretches up to `end` steps, with knots at `begins` among others;
-    `stretch_error`: largest difference between stretches by the yields and by their law, for moves of the input within
-    `ways` in a step and overall, and rounding errors `held` (K,); `disorder`: by how much plays leave the order of
-    their thresholds by the yields, with stretches up to `top`.
+    drive steps up to `largest_step` and stretches up to `span`; `moves`: their kind; `in_order`: whether no play yields
+    faster than one with a smaller threshold; `stood_in_for`: whether other plays stand in for them, as allowed in the
+    inverse only; `falling`: smallest change in one step, at most 0, of the sum of the plays with a threshold per change
+    of their input, if contributions rise by up to `steep` times their play; `responses`: for each number of plays that
+    follow, slope at rest, response (N,) at the factors `z` of a delay by one sample, and the part of it that comes at
+    once; `whole_yields`: the yields in fixed point, for stretches up to `end` steps, with knots at `begins` among
+    others; `stretch_error`: largest difference between stretches by the yields and by their law, for moves of the input
+    within `ways` in a step and overall, and rounding errors `held` (K,); `disorder`: by how much the yields take plays
+    out of the order of their thresholds, for stretches up to `top`.
     """
 
     def after(self, plays: Array, x: float, w: float, seconds: float) -> Array: ...
@@ -149,7 +147,7 @@ class Mover(Protocol):
 
 class Bent(NamedTuple):
     """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`; `bump`
-    of play i > 0: a key that plays with the same bend share, and the difference between its contribution and itself."""
+    of play i > 0: a key that plays with the same bend share, and its contribution minus the play itself."""
 
     bends: int
     curve: Array
@@ -158,14 +156,14 @@ class Bent(NamedTuple):
 
 
 class Moves(NamedTuple):
-    """The functions of moving plays in one arithmetic, of the tables m, thresholds r, the index i of a play, the memory
-    s of all plays, their rounding remainders and their input w.
+    """The functions of moving plays in one arithmetic; arguments: the tables m, thresholds r, the index i of a play,
+    the memory s of all plays, their rounding remainders and their input w.
 
-    `moved`: play i after its input has gone to w; `move`: it moves there, and whether it does; `put`: it is put to rest
-    at a place; `rest`: where it would come to rest with its input held; `tried`, in floating point: whether it moves
-    when its input goes to w or, before the first drive, comes to rest there, the value it reaches, and its share of a
-    further change of w. `follow`: all plays with one time constant follow their input,
-    which gives their sum; `input`: that at which their sum is h.
+    `moved`: play i after its input has gone to w; `move`: moves it there, returns whether it moves; `put`: puts it to
+    rest at a position; `rest`: where it would come to rest with its input held; `tried`, in floating point: whether it
+    moves when its input goes to w or, before the first drive, comes to rest there, the value it reaches, and its change
+    per further change of w. `follow`: moves all plays, which share a time constant, as their input goes to w, returns
+    their sum; `input`: the input at which their sum is h.
     """
 
     moved: Function  # of m, r, i, s, lost, w
@@ -178,8 +176,8 @@ class Moves(NamedTuple):
 
 
 class Bending(NamedTuple):
-    """The functions of bent plays in one arithmetic: the contribution of play i at z; and in floating point that, and
-    its change per change of z."""
+    """The functions of bent plays in one arithmetic: `bent`: the contribution of play i at z; `steep`, in floating
+    point only: the contribution and its change per change of z."""
 
     bent: Function  # of m, plays, i, z
     steep: Any = None  # of the same
@@ -187,8 +185,8 @@ class Bending(NamedTuple):
 
 @dataclass(frozen=True)
 class PlaysPart(Generic[T, F]):
-    """An effect on plays: `of` makes what it tells of a model's plays, from the effect, thresholds and weights;
-    `floating`: its functions, `Moves` or `Bending`; `coded` loads them in fixed point."""
+    """An effect on plays: `of` describes it for a model's plays, from the effect, thresholds and weights; `floating`:
+    its functions, `Moves` or `Bending`; `coded` loads them in fixed point."""
 
     of: Callable[..., T]
     floating: F

@@ -8,7 +8,7 @@ from hystgen.plays.fixed import nearest
 
 HALF = 1 << 30
 
-# the curves of the memoryless part, each with two branches
+# offsets of the two curves of the memoryless part, each with two branches
 FORWARD, INVERSE = 0, 2
 
 

@@ -79,7 +79,7 @@ class Discretisation:
 
     `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output units;
     beyond R the slopes differ only by rounding. `output_error` bounds the output's error for every drive and history
-    that keep the plays within R of zero; further out, the rounding of the weights counts in proportion to the plays.
+    that keep the plays within R of zero; further out, rounding of the weights adds an error in proportion to the plays.
     """
 
     thresholds: tuple[float, ...]
@@ -154,8 +154,8 @@ class Formula:
 def _power(base: mpf, exponent: mpf) -> mpf:
     """`base**exponent`. Raises ValueError where it is not real.
 
-    A large exponent is handled by the logarithm, with the extra bits that this costs: an integer power would take up to
-    a thousand squarings of ever longer numbers.
+    A power with a large exponent is computed from the logarithm, with extra bits to make up for its loss: an integer
+    power would take up to a thousand squarings of ever longer numbers.
     """
     mp = _context()
     if abs(exponent) <= _LARGE_POWER or base == 0:

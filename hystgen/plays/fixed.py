@@ -1,4 +1,4 @@
-"""Plays in fixed point: rounding, dividing by a slope with a reciprocal, and solving in engine loop.
+"""Plays in fixed point: rounding, dividing by a slope with a reciprocal, and solving in the loop engine.
 
 Inputs of the plays are integer multiples of a smallest step, sums are integer multiples of a fraction of an output
 code, and both engines compute the same integers, so they agree in every bit.
@@ -14,7 +14,7 @@ from hystgen.plays.slots import OUTPUT_CLAMPED, Reals
 
 
 class FixedPlayTables(PlayTables, Protocol):
-    """The constants of a model that plays need in fixed point."""
+    """The model constants that plays need in fixed point."""
 
     @property
     def slope(self) -> Reals: ...
@@ -32,7 +32,7 @@ class FixedPlayTables(PlayTables, Protocol):
 
 LINE = 3031741620
 FALL = 2021161080
-"""The reciprocal of x in 1/2 .. 1 is 48/17 - 32/17 x to 1/17: 48/17 in units of 2^-30, 16/17 in units of 2^-31."""
+"""For x in 1/2 .. 1, 1/x is 48/17 - 32/17 x to within 1/17: 48/17 in units of 2^-30, 16/17 in units of 2^-31."""
 
 
 @jit
@@ -65,7 +65,7 @@ def divide_by_slope(t: FixedPlayTables, d: int, k: int) -> int:
 
 @jit
 def mantissa(x: int) -> tuple[int, int]:
-    """Whole x > 0 as a mantissa of 31 bits, and the bits that it is shifted up: first below 2^63."""
+    """An integer x > 0 below 2^63 as a mantissa of 31 bits, and the number of bits that it was shifted left."""
     raised = 0
     for bits in (32, 16, 8, 4, 2, 1):
         if x >> (63 - bits) == 0:
@@ -76,14 +76,14 @@ def mantissa(x: int) -> tuple[int, int]:
 
 @jit
 def quotient(x: int, y: int, bits: int) -> int:
-    """2^bits x / y to a part in 2^28 and to the nearest whole number, for whole x >= 0 and y > 0 below 2^62; no less
-    than 2^59 where it is above that."""
+    """2^bits x / y to a part in 2^28, rounded to an integer, for integers x >= 0 and y > 0 below 2^62. If it exceeds
+    2^59, the result is at least 2^59."""
     if x == 0:
         return x
     number, raised = mantissa(x)
     divisor, lifted = mantissa(y)
     rate = LINE - ((divisor * FALL) >> 31)
-    for _ in range(3):  # 2^61/divisor: each step squares its share of error, at first 1/17
+    for _ in range(3):  # 2^61/divisor: each step squares the relative error, initially 1/17
         rate = (rate * ((1 << 31) - ((divisor * rate) >> 31))) >> 30
     shift = 60 + raised - lifted - bits
     if shift > 62:
@@ -93,7 +93,7 @@ def quotient(x: int, y: int, bits: int) -> int:
 
 @jit
 def input_further(t: FixedPlayTables, w: int, d: int, k: int, rising: int) -> int:
-    """The input of the plays, at most slightly outside their range, at which the output is d beyond that at w."""
+    """The input of the plays at which the output is d beyond that at w; at most slightly outside their range."""
     step = divide_by_slope(t, d, k)
     if rising:
         most = t.limits.play.high[0] + t.limits.margin[0]

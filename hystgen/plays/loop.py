@@ -17,7 +17,7 @@ from hystgen.plays.slots import LimitTable, Reals, StepState
 
 
 class PlayTables(Protocol):
-    """The constants of a model that memory and plays need, in any arithmetic."""
+    """The model constants that memory and plays need in any arithmetic."""
 
     @property
     def threshold(self) -> Reals: ...
@@ -28,7 +28,7 @@ class PlayTables(Protocol):
 
 
 class LoopTables(PlayTables, Protocol):
-    """The additional constants that solving needs in floating point."""
+    """The additional model constants that solving needs in floating point."""
 
     @property
     def lift(self) -> Reals: ...

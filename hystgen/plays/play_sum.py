@@ -40,7 +40,7 @@ def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> 
     for i in range(2, n + 1):
         reach = thresholds[i] - thresholds[i - 1]
         states.append(min(max(float(requested[i]), states[-1] - reach), states[-1] + reach))
-    # sums of decimal numbers are inexact by rounding, which does not count as a projection
+    # rounding in sums of decimal numbers does not count as a projection
     grain = 8 * np.finfo(np.float64).eps
     moved = any(
         abs(a - float(b)) > grain * max(abs(a), abs(float(b)), r)
@@ -111,7 +111,7 @@ class PlaySum:
         at each corner is the change of slope there (22)(23); the limit is the density `p(r) = phi''(r)`.
 
         `x`: N + 1 strictly rising points from 0 on, in input units; `phi`: the curve's values there, from 0, in output
-        units. The last slope continues beyond. The thresholds are the first N points. Raises ValueError otherwise.
+        units. Beyond, the last slope continues. The thresholds are the first N points. Raises ValueError otherwise.
         """
         points, curve = finite_numbers(np.asarray(x).tolist(), "x"), finite_numbers(np.asarray(phi).tolist(), "phi")
         if len(points) != len(curve) or len(points) < 2:

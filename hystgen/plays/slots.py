@@ -19,7 +19,7 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
-# the bits that identify a call, and a bit that leaves the call's status for a later call to read with its own
+# the bits that identify a call, and a flag: leave its status unread, for a later call to report along with its own
 OP_CALL, OP_UNREAD = 127, 128
 
 
@@ -31,21 +31,21 @@ class Range(Struct):
 
 
 class LimitTable(Struct):
-    """The limits of drive and output, and numbers that go with them; those from `play` on are for fixed point only."""
+    """Limits of drive and output, and related numbers; those from `play` on are for fixed point only."""
 
     drive: Range
     output: Range
     offset: Real  # added to every output
-    hold: Real  # largest step back at which the drive is held instead
+    hold: Real  # largest backward step of the drive that is suppressed: the drive is held instead
     real_max: Real  # largest number
     zero: Real  # in the type of the arithmetic
     play: Range  # of the inputs of the plays
-    margin: Real  # by which rounding may take such an input further
-    fraction: Real  # bits of a sum below an output code
-    fine: Real  # bits of an input of the plays below a drive code
+    margin: Real  # by which rounding can take such an input out of its range
+    fraction: Real  # fraction bits of a sum, in output codes
+    fine: Real  # fraction bits of an input of the plays, in drive codes
     code_max: Real  # largest code of either sign
     saturated: Real  # largest sum that is not reported as limited
-    shy: Real  # [output codes] by which a step that may end at a limit is found beforehand
+    shy: Real  # [output codes] safety margin for telling in advance that a step cannot end at a limit
 
 
 class StepState(Struct):
@@ -67,7 +67,7 @@ class StepState(Struct):
     stepped: Flag  # a step has answered
     committed: Flag  # a drive has been committed since
     repeated: Flag  # the last answer is still valid for `reference`
-    usual: Flag  # in the last step the same plays followed
+    usual: Flag  # the last step took the fast path: the same plays followed
     sought: Flag  # a solution has been found since the plays last followed
     bits: UInt32  # status of the last answer
     status: UInt32

@@ -1,4 +1,4 @@
-"""The gain that ageing leaves, from the distance that the drive has travelled."""
+"""Ageing: the gain as a function of the distance that the drive has travelled."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ travel is a few moves over the range is then covered for a million times as many
 if the gain falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
-"""[share of the output] Largest difference between a table and its gain, about the rounding of ten operations in
-float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times the travel at which it begins:
-`0.05/2.3 * 6/384 * 0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
+"""[fraction of the output] Largest difference between a table and its gain, about the rounding of ten operations in
+float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times the travel where it begins: `0.05/2.3 *
+6/384 * 0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
 
 
 def losses(effect: ExponentialAgeing | SeveralAgeing) -> list[tuple[float, float]]:
-    """The losses that come to an end, each with its travel."""
+    """The losses that level off, each with its travel."""
     if isinstance(effect, ExponentialAgeing):
         return [(effect.loss, effect.travel)]
     return list(zip(effect.losses, effect.travels, strict=True))
@@ -78,7 +78,7 @@ def gain(effect: Ageing, travelled: float) -> float:
 
 
 def steepness(effect: Ageing, travelled: float) -> float:
-    """Change of the gain per input unit of travel."""
+    """Change of the gain per input unit travelled."""
     if isinstance(effect, LogarithmicAgeing):
         return -effect.loss / (math.log(10.0) * (effect.travel + travelled))
     return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in losses(effect))
@@ -88,7 +88,7 @@ class AgeingPiece(Struct):
     """A piece of the gain over travel: a cubic in the fraction of its length."""
 
     begin: Signal
-    share: Real  # of a unit of travel in the length
+    share: Real  # fraction of the length per unit of travel
     c: FourNarrow
 
 
@@ -178,7 +178,7 @@ class AgeingTable(Struct):
 
 
 class AgeingNumbers(AgeingTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 class AgeingState(Struct):
@@ -234,14 +234,14 @@ class UnevenAgeing:
 
 @jit
 def along(t: AgeingTables, k: int, travel: Scalar) -> Scalar:
-    """The place of a travel in piece k, from 0 on; past the last piece it stays at the end."""
+    """The position of a travel in piece k, from 0 to 1; past the last piece it stays at 1."""
     share = (travel - t.row.begin[k]) * t.row.share[k]
     return t.block.one[0] if share > t.block.one[0] else share
 
 
 @jit
 def travel_on(t: AgeingTables, s: AgeingState, j: int, way: Scalar) -> None:
-    """The drive has travelled on."""
+    """Add the length of a move to the travel."""
     change = way + s.low[j]
     high = s.high[j]
     following: Scalar = high + change
@@ -253,8 +253,8 @@ def travel_on(t: AgeingTables, s: AgeingState, j: int, way: Scalar) -> None:
 
 
 def verbs(by: Gains, state: type[Struct], along: Answer, part_of: Answer, travel_on: Action) -> Verbs:
-    """The verbs of ageing in an arithmetic: from the functions of that name above; `part_of`: a gain times a place in a
-    piece."""
+    """The verbs of ageing in an arithmetic, from its `along` and `travel_on`; `part_of`: the product of a gain and a
+    position in a piece."""
     followed, times, reciprocal, given, put = following(by), by.times, by.reciprocal, by.given, by.put
 
     @jit
@@ -319,7 +319,7 @@ def verbs(by: Gains, state: type[Struct], along: Answer, part_of: Answer, travel
 
     @jit
     def travelled(s: AgeingState, j: int) -> Scalar:
-        """The travel."""
+        """The distance travelled."""
         return s.high[j]
 
     return Verbs(

@@ -1,4 +1,4 @@
-"""The gain that ageing leaves in fixed point, over a travel in drive codes that is counted exactly."""
+"""Ageing in fixed point: the gain as a function of the travel, which is counted exactly in drive codes."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from hystgen.effects.kinds import RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
 
 SHARE_BITS = 20
-"""Bits of the fraction of a piece's length; the gain, which changes by a hundredth along a piece, then has 27."""
+"""Bits of a position as a fraction of a piece's length; the gain changes by a hundredth over it, so it has 27 bits."""
 
 CUBIC_ERROR = 8.0 * 2.0**-GAIN_BITS
-"""[share of the signal] Error of a gain from a cubic piece: four coefficients and products, and a fraction of the
+"""[fraction of the signal] Error of a gain from a cubic piece: four coefficients and products, and a fraction of the
 length rounded to 20 bits, over which the gain changes by a hundredth."""
 
 LONGEST = 2**61
@@ -39,7 +39,7 @@ class FixedAgeingPiece(Struct):
     """A piece of the gain over travel: a cubic in the fraction of its length."""
 
     begin: Signal
-    share: Factor  # of the travel since `begin`, without the bits that the product drops
+    share: Factor  # position in the piece per travel since `begin`, after `drop`
     drop: UInt8
     c: FourNarrow
 
@@ -47,11 +47,11 @@ class FixedAgeingPiece(Struct):
 class FixedAgeingTable(AgeingTable):
     """Gain over travel up to `last`."""
 
-    bits: UInt8  # of a gain below the code that sets it
+    bits: UInt8  # left shift from a caller's code to a gain
 
 
 class FixedAgeingNumbers(FixedAgeingTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 class FixedAgeingState(Struct):
@@ -74,7 +74,7 @@ FixedAgeingTables = RowedTables[FixedAgeingNumbers, FixedAgeingPiece]
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
     """Tables from the pieces of the gain and the Newton steps of each ageing effect, for drive codes of `lsb`.
 
-    `bits`: of a gain below the code that sets it. Raises OverflowError if a number does not fit.
+    `bits`: left shift from a caller's code to a gain. Raises OverflowError if a number does not fit.
     """
     piece: list[tuple[object, ...]] = []
     block = []
@@ -111,13 +111,13 @@ class AgeingFormats(Coded):
 
 
 def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
-    """A block of a model."""
+    """The formats of a block."""
     turns = newton_steps(floating.most_at_once(one.effect, about.ends[1] - about.ends[0]), 2.0**-GAIN_BITS)
     return AgeingFormats(one, floating.pieces(one.effect), turns)
 
 
 def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgeingTables:
-    """The tables of several blocks, by `tables`."""
+    """The tables of several blocks, made by `tables`."""
     rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
 
@@ -135,13 +135,13 @@ def along(t: FixedAgeingTables, k: int, travel: int) -> int:
 
 @jit
 def part_of(gain: int, share: int) -> int:
-    """A gain times a place in a piece."""
+    """The product of a gain and a position in a piece."""
     return (gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS
 
 
 @jit
 def travel_on(t: FixedAgeingTables, s: FixedAgeingState, j: int, way: int) -> None:
-    """The drive has travelled on."""
+    """Add the length of a move to the travel."""
     following = s.high[j] + way
     s.high[j] = t.block.last[j] if following > t.block.last[j] else following
 

@@ -66,7 +66,7 @@ class LogarithmicAgeing(_Ageing):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Loss and travel, with the travel from a thousandth of the recorded one to ten times it."""
+        """Loss and travel; the travel between a thousandth and ten times the recorded travel."""
         return [cls._candidate("ageing, logarithmic", about)]
 
 
@@ -83,7 +83,7 @@ class ExponentialAgeing(_Ageing):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Loss and travel, with the travel from a thousandth of the recorded one to ten times it."""
+        """Loss and travel; the travel between a thousandth and ten times the recorded travel."""
         return [cls._candidate(EXPONENTIAL, about)]
 
 
@@ -103,7 +103,7 @@ class SeveralAgeing(_Ageing):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """The problem of not having one loss for each travel."""
+        """A problem unless there is one loss for each travel."""
         yield from not_as_many("losses", self.losses, "travels", self.travels)
 
     def gain(self, run: Run) -> Array:

@@ -1,4 +1,4 @@
-"""Creep as a block: exactly invertible, since each state immediately follows a known share of a move."""
+"""Creep as a block: exactly invertible, since each state immediately follows a known fraction of a move."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
 @dataclass(frozen=True)
 class CreepNumbers(One):
     """Constants of a block `y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)` at even steps, in
-    double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): 1 - E, c b0,
-    c b1, c of each state.
+    double precision: d is the fraction of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4), of each
+    state: 1 - E, c b0, c b1, c.
 
     The inverse, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`, is stable for d > 0 and any time
     constants, since the response is strictly positive real.
@@ -67,7 +67,7 @@ class CreepNumbers(One):
         return 1.0 / around if around > 0.0 else 2.0 / self.slope - 1.0 / self.rest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs up to `size`, and of the inverse itself."""
+        """Rounding errors of the output for inputs up to `size`, and of the inverse itself."""
         rate, weight = self.terms[:, RATE], self.terms[:, WEIGHT]
         states = (16.0 + len(self.terms)) * float(np.sum(weight)) + u * float(np.sum(weight / rate))
         found = u * size * (states + 4.0 * self.rest)
@@ -131,7 +131,7 @@ class CreepTerm(Struct):
 
 
 class CreepTable(Struct):
-    """Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the sample before."""
+    """Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the previous sample."""
 
     slope: Real  # immediate change of y with h
     inverse_slope: Real
@@ -199,7 +199,7 @@ def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -217,7 +217,7 @@ ARITHMETIC = Realized(
 
 
 class UnevenCreep(Block):
-    """Creep in double precision at steps of any length, by the functions above."""
+    """Creep in double precision for steps of any length, computed by the functions above."""
 
     def __init__(self, effect: ExponentialCreep | LogarithmicCreep) -> None:
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
@@ -226,8 +226,8 @@ class UnevenCreep(Block):
         self.state: CreepMemory = memory_of(CreepMemory)(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
-        """The `tables` of a step; its states are advanced to the next output with the E and b0 of the next step, and
-        see a share `(E b1 + b0)/(1 - E)` of an input, with the b1 of this step."""
+        """The `tables` of a step. States advance to the next output with the E and b0 of the next step, and weight an
+        input by `(E b1 + b0)/(1 - E)`, with the b1 of this step."""
         now, following = self._numbers(seconds), self._numbers(later)
         rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
         found = tables([now], lambda values, _: np.array(values))

@@ -24,11 +24,11 @@ from hystgen.plays.fixed import nearest
 
 
 class FixedCreepTerm(Struct):
-    """A state of creep: its contribution to the next output approaches weight times the input, by a share `rate` per
-    step."""
+    """A state of creep: its contribution to the next output approaches weight times the input, by the fraction `rate`
+    of the distance per step."""
 
     rate: Factor
-    late: Factor  # share of a change of the input that acts at once
+    late: Factor  # fraction of a change of the input that acts at once
     weight: Factor
     lift: UInt8  # bits of a state that the product with `late` drops
 
@@ -39,7 +39,7 @@ class FixedCreepTable(Struct):
     direct: Factor  # d
     inverse_slope: Factor  # 1 / (immediate change of y with h)
     inverse_rest: Factor  # h over y at rest
-    bits: UInt8  # bits of the states below those of a signal,
+    bits: UInt8  # fraction bits of the states beyond a signal's,
     drop: UInt8  # and bits that products drop
     n: Count
 
@@ -65,10 +65,10 @@ FixedCreepMemory = RowedMemory[FixedCreepState, FixedCreepTermState]
 
 
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
-    """Bits of the states below a signal's, and those dropped before a product, for inputs up to `size`.
+    """Fraction bits of the states beyond a signal's, and bits dropped before a product, for inputs up to `size`.
 
-    `code`: bits of a signal below an output code. Raises OverflowError if the slowest state would stall more than a
-    quarter of a code from its target.
+    `code`: fraction bits of a signal, in output codes. Raises OverflowError if the slowest state would stall more than
+    a quarter of a code from its target.
     """
     slowest = float(np.min(effect.terms[:, 0]))
     states = max(float(np.sum(effect.terms[:, 3])) * size, 1.0)
@@ -81,7 +81,7 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class CreepFormats(Coded):
-    """A block: bits of its states below a signal's, and those dropped before a product."""
+    """A block: fraction bits of its states beyond a signal's, and bits dropped before a product."""
 
     one: CreepNumbers
     bits: int
@@ -89,11 +89,11 @@ class CreepFormats(Coded):
 
     @property
     def direct(self) -> float:
-        """The share of a step that arrives at once."""
+        """The fraction of a step that arrives at once."""
         return self.one.rest - math.fsum(self.one.terms[:, 3].tolist())
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
+        """Rounding errors of the output for inputs up to `size`, with signals in units of `signal`."""
         state, found = 2.0**-self.bits * signal, 0.0
         for rate, _, late, weight in self.one.terms.tolist():
             scale = 2.0 ** (self.bits - lifted(late, self.bits))
@@ -167,7 +167,7 @@ def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int
 
 @jit
 def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.block.before[j]
     direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])
     total = zero(x)

@@ -19,10 +19,10 @@ FASTEST = 0.01
 """[s] Motion that settles faster than this after a move is due to a lag or domain-wall friction, not creep."""
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
-"""[fractions of the play sum, per decade and per state] Largest to try: stages creep by 1 to 2 % per decade, some by up
-to three times that; with few states, each represents up to three decades. Set by: 16 blind plants with creep (`make
-blind FIRST=97000`): with half the first, the creep of one plant is not named and two are 3 and 7 % worse; with half the
-second, one is 5 % worse; doubling either changes none by 2 %."""
+"""[fractions of the play sum, per decade and per state] Largest values tried: stages creep by 1 to 2 % per decade, some
+by up to three times that; with few states, each represents up to three decades. Set by: 16 blind plants with creep
+(`make blind FIRST=97000`): with half the first, the creep of one plant is not named and two are 3 and 7 % worse; with
+half the second, one is 5 % worse; doubling either changes none by 2 %."""
 
 SHORTER = 1.0
 """[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
@@ -111,7 +111,7 @@ class ExponentialCreep(_Creep):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """The problem of not having one weight for each time constant."""
+        """A problem unless there is one weight for each time constant."""
         yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
 
     def time_scale(self, drive_range: float) -> float:
@@ -179,7 +179,7 @@ class LogarithmicCreep(_Creep):
     settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """The problem of t_min and t_max unless t_min < t_max, at most 12 decades apart."""
+        """A problem unless t_min < t_max, at most 12 decades apart."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:
@@ -257,6 +257,6 @@ SHAPES = (ExponentialCreep, LogarithmicCreep)
 
 
 def load() -> None:
-    """Compile the recursions, or read them from the cache, on two samples."""
+    """Compile the recursions, or load them from the cache, by running them on two samples."""
     one, total = np.ones((1, 1)), np.empty((2, 1))
     creep(np.arange(2.0)[:, None], np.zeros(1, dtype=np.intp), one, one, one, np.ones(1), np.ones((1, 1)), total)

@@ -24,8 +24,8 @@ MOST_SAMPLES = 2**15
 
 
 class DelayTables(NamedTuple):
-    """`share` (1,): elapsed share of the step after the oldest sample, in fixed point (1, 2); `samples`: the
-    number that wait, 0 without a delay."""
+    """`share` (1,), in fixed point (1, 2): elapsed fraction of the step after the oldest sample; `samples`: how many
+    wait, 0 without a delay."""
 
     share: Reals
     samples: int
@@ -45,12 +45,12 @@ class Wait(One):
     time: float
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the delayed drive."""
+        """Rounding errors of the delayed drive."""
         return 4.0 * u * size, 0.0
 
 
 def numbers(seconds: float, step: float) -> tuple[float, int]:
-    """Share and number of samples of a delay at steps of `step`."""
+    """`share` and `samples` of `DelayTables` for a delay at steps of `step`."""
     late = seconds / step
     whole = math.ceil(late)
     return whole - late, whole + 1 if late > 0.0 else 0
@@ -103,7 +103,7 @@ def verbs(product: Answer) -> Verbs:
 
     @jit
     def absorb(t: DelayTables, line: Waiting, j: int, v: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """Take the drive v of this sample. Returns the delayed drive."""
+        """Absorb the drive v of this sample. Returns the delayed drive."""
         delay_put(line, v)
         return delayed(t, line)
 
@@ -111,7 +111,7 @@ def verbs(product: Answer) -> Verbs:
 
 
 def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], NDArray[Any]]) -> DelayTables:
-    """The tables of a model's delays, combined into one delay; `share`: converts a share to the arithmetic."""
+    """The tables of a model's delays, combined into one delay; `share`: converts a fraction to the arithmetic."""
     waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 

@@ -20,7 +20,7 @@ CARRY_SAMPLES = 2.0**24
 class ClockTable(Struct):
     """Drift over time: its rate, and half the change of the rate per second."""
 
-    sample: Real  # duration in s of one sample, and of `carry` of them
+    sample: Real  # duration in s of one sample, and of a block of `carry` samples
     block: Real
     carry: Real
     rate: Real
@@ -29,16 +29,16 @@ class ClockTable(Struct):
 
 
 class ClockNumbers(ClockTable):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
     one: Real
-    most_ahead: Real  # samples by which references are ahead at most
+    most_ahead: Real  # largest number of samples by which references are ahead
 
 
 class ClockState(Struct):
     """A clock."""
 
-    high: Real  # samples, in units of the table's carry and of one
+    high: Real  # samples counted: full blocks of `carry`, and those since
     low: Real
     lead: Real  # samples by which the next reference is ahead
 
@@ -97,7 +97,7 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
 
     @jit
     def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Scalar:
-        """The drift by the time of the newest reference."""
+        """The drift at the time of the newest reference."""
         late = s.lead[j] if filled else zero(t.one[j])
         return drift(t, s, j, late + t.one[j] if moving else late)
 

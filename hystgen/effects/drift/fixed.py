@@ -31,14 +31,14 @@ class FixedClockTable(Struct):
     change: Int64
     samples: Int64  # after which the drift stays constant
     farthest: Int64
-    bits: UInt8  # bits of slope and change below those of a signal
+    bits: UInt8  # fraction bits of slope and change beyond a signal's
 
 
 class FixedClockNumbers(FixedClockTable):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
     one: Int64
-    most_ahead: Int64  # samples by which references are ahead at most
+    most_ahead: Int64  # largest number of samples by which references are ahead
 
 
 class FixedClockState(Struct):
@@ -137,7 +137,7 @@ def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) ->
 
 
 def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockFormats:
-    """The clock of an effect, for references as far ahead as they may be."""
+    """The clock of an effect, for references up to `about.ahead` samples ahead."""
     return numbers(effect, about.seconds, about.output_lsb / 2**about.bits, float(about.farthest), about.ahead)
 
 

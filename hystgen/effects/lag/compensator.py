@@ -27,16 +27,16 @@ benchmarks/chosen_numbers.py lag."""
 
 
 MOST_LED = 2.0
-"""[times the previous move] Largest move of a target that is fully led in front of two branches, so that a step is not
-led beyond its end, from which the drive would have to turn back. A step of 0.2 um out of a slow ramp overshoots by
-0.002 um, without the limit by 0.1 um. The error on a sine of 100 samples from rest is 0.0032 um rms with 2 or more,
-0.0045 um with 1. Set by: benchmarks/chosen_numbers.py branches."""
+"""[times the previous move] Largest move of a target that is led in full in front of two branches: otherwise a step is
+led beyond its end, from where the drive has to turn back. A step of 0.2 um out of a slow ramp overshoots by 0.002 um,
+without the limit by 0.1 um. The error on a sine of 100 samples from rest is 0.0032 um rms with 2 or more, 0.0045 um
+with 1. Set by: benchmarks/chosen_numbers.py branches."""
 
 
 @dataclass(frozen=True)
 class LagNumbers(One):
-    """Whether the inverse is `exact`, and constants: `1 - E`, theta, b1, `1/(1 - E)`, or else b0 and `1/b1` as `second`
-    and `inverse`."""
+    """Whether the inverse is `exact`, and constants: `rate` is 1 - E, `late` is b1; `second` and `inverse` are b0 and
+    1/b1 if exact, otherwise theta and 1/(1 - E)."""
 
     exact: bool
     rate: float
@@ -52,7 +52,7 @@ class LagNumbers(One):
 
     @property
     def room(self) -> float:
-        """Largest gain up to its intermediate results."""
+        """Largest gain from its input to an intermediate result."""
         return 2.0 / (self.late if self.exact else self.rate)
 
     @property
@@ -61,14 +61,14 @@ class LagNumbers(One):
         return not self.exact
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs up to `size`; those of the inverse are in `led`."""
+        """Rounding errors of the output for inputs up to `size`; those of the inverse are in `led`."""
         return u * size * (8.0 + u / self.rate), 0.0
 
     def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
-        """The error of the input for an error of the requested output.
+        """Error of the input caused by an error of the requested output.
 
-        States that have seen the same drives pass on `goal/rate`, and the error of the previous target, which follows
-        from earlier targets, `W = theta^2 e + theta (1 - theta) W`.
+        If the states have seen the same drives, it is `goal/rate`. The goal includes the error W of the previous
+        target, which includes those of earlier targets: `W = theta^2 e + theta (1 - theta) W`.
         """
         rate, theta = self.rate, self.second
         if self.exact:
@@ -102,7 +102,7 @@ class LagNumbers(One):
 
 
 class LagSizes:
-    """Largest sizes of a lag's signals: its input, the output asked of it, its states, and the inverse's answer;
+    """Largest sizes of a lag's signals: its input, the requested output, its states, and the inverse's answer;
     `turning`: in front of two branches."""
 
     def __init__(
@@ -141,7 +141,7 @@ def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | No
 def shifted(theta: float, turning: bool = False) -> float:
     """Largest error of a lag's goal, for errors up to 1 of the requested output, if the lag has seen the same drives.
 
-    The previous target follows from the drive that led to it and retains earlier errors, `W = theta^2 + theta (1 -
+    The previous target is computed from the drive that led to it, and retains earlier errors, `W = theta^2 + theta (1 -
     theta) W`. In front of two branches (`turning`) the led move is off by the errors of two targets, or `MOST_LED`
     times those errors.
     """
@@ -218,7 +218,7 @@ class EitherTables(NamedTuple, Generic[L, X]):
 
 
 class EitherMemory(NamedTuple, Generic[L, X]):
-    """Memory of all lags: of each lag as a led lag, and as a lag that is inverted exactly."""
+    """Memory of all lags: of each lag both as a led lag and as one that is inverted exactly."""
 
     led: L
     inverted: X
@@ -275,7 +275,7 @@ def lag_solve(t: LagTables, s: LagMemory, j: int, y: Scalar) -> Scalar:
 
 @jit
 def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     if t.exact[j]:
         reached = s.inverted.reached[j]
         given = t.inverted.early[j] * s.inverted.before[j] + t.inverted.late[j] * x
@@ -294,7 +294,7 @@ def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Scalar) -> Scalar:
 
 @jit
 def steady_missed(t: LagTables, way: Scalar) -> Scalar:
-    """How far a model's only lag falls short of a move in its first sample."""
+    """How far a model's only lag falls short of a move in the first sample of the move."""
     return t.led.theta[0] * way
 
 
@@ -313,8 +313,8 @@ def steady_solve(
     t: LagTables, s: LagMemory, y: Scalar, moved: Scalar, rises: int, applied: Scalar, little: Scalar
 ) -> tuple[Scalar, Scalar]:
     """The input that leads a model's only lag to the output y without turning it back from the direction `rises`, and
-    the move to y from the previously requested output, `moved` being the move before. A brake sees only the led part of
-    the move, and the previous input's shortfall."""
+    the move to y from the previously requested output, `moved` being the previous one. A brake takes into account only
+    the led part of the move and the previous input's shortfall."""
     way = y - s.led.asked[0]
     missed = s.led.earlier[0] - s.led.wanted[0]
     s.led.wanted[0] = y - steady_led(way, moved)
@@ -327,8 +327,8 @@ def steady_solve(
 
 @jit
 def steady_kept(t: LagTables, s: LagMemory, v: Scalar, rises: int, applied: Scalar, little: Scalar) -> Scalar:  # noqa: ARG001  used in fixed point
-    """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else an input with which x comes
-    to rest without going back: the last input, `applied`, or the input ahead of x by `little`."""
+    """The input v if it is ahead of x by `little` or more, in the direction `rises`. Otherwise an input with which x
+    comes to rest without reversing: the last input, `applied`, or the input ahead of x by `little`."""
     x = s.led.high[0]
     ahead, kept = (v - x, applied - x) if rises else (x - v, x - applied)
     if ahead >= little:
@@ -340,8 +340,8 @@ def steady_kept(t: LagTables, s: LagMemory, v: Scalar, rises: int, applied: Scal
 
 @jit
 def steady_absorb(s: LagMemory, before: Scalar) -> None:
-    """Note that the lag has moved from x = `before`. The rounding error of a sum is known exactly unless x has moved by
-    more than its own size; it could then take x back, and is dropped."""
+    """Note that the lag has moved from x = `before`. The remainder of the sum is exact unless x has moved by at least
+    its own size; it could then move x backwards, and is dropped."""
     x = s.led.high[0]
     way = x - before
     if (-way if way < 0 else way) >= (-before if before < 0 else before):
@@ -358,11 +358,11 @@ def braked(
     """The drive at which a model's only lag does not overshoot, although the drive comes back by at most `falling` or
     `rising` per step.
 
-    `near`: the reachable drive nearest to the answer, `short` of it. A target that moves on by `way` per step takes a
+    `near`: the reachable drive nearest to the answer, off by `short`. A target that moves by `way` per step requires a
     lead of `way/(1 - E)`. With a lead m beyond that, which shrinks by `back` per step, the lag gains at most `(1 - E)(m
-    + back/2)^2/(2 back)` on the target; it has to gain `left`. Up to `left = (1 - E) back/2` it arrives in one step,
-    and a drive no farther than the lag's destination never overshoots. A lead that no limit affects is already right:
-    the drive is reduced by at most its present and previous shortfall from the answer. `halves`: of the search for m.
+    + back/2)^2/(2 back)` on the target; it has to gain `left`. If `left` is at most `(1 - E) back/2`, it arrives in one
+    step, and a drive up to the lag's destination never overshoots. A lead that no limit affects is right: the drive is
+    reduced by no more than its present and last shortfall. `halves`: of the search for m.
     """
     missed = s.led.earlier[0] - s.led.wanted[0]
     room = short + (-missed if missed < 0 else missed) * t.led.inverse_rate[0]
@@ -421,8 +421,8 @@ ALL_HALVES = 64
 
 
 class UnevenLag(Block):
-    """A lag in double precision at steps of any length: the first of two rows leads it, the second inverts it exactly
-    and gives its output. With `always_led` it is led, since a rounded drive does not arrive exactly."""
+    """A lag in double precision at steps of any length: row 0 of its tables leads it, row 1 inverts it exactly and
+    gives its output. With `always_led` it is led at any step, since a rounded drive does not arrive exactly."""
 
     def __init__(self, effect: Lag) -> None:
         self.rises: Callable[[], bool] | None = None
@@ -440,7 +440,7 @@ class UnevenLag(Block):
 
     @property
     def patience(self) -> float:
-        """The share of the distance to the other branch by which it falls short in the first sample of a turn."""
+        """The fraction of the distance to the other branch by which it falls short in the first sample of a turn."""
         return 0.0 if self.exact else float(self.table.led.theta[0])
 
     def call(self, verb: str, x: float) -> float:

@@ -1,4 +1,4 @@
-"""A lag as a block in fixed point: the same split as in floating point, with states that have bits below a signal's.
+"""A lag as a block in fixed point: the same split as in floating point, with states finer than a signal.
 
 Instead of the input solved for, which can be as large as the lead, the state keeps the lag's intended move `lead`; with
 another input, the target falls short by `1 - theta` times the difference between the two moves.
@@ -41,8 +41,8 @@ class FixedLagTable(Struct):
     rate: Factor
     theta: Factor
     inverse_rate: Factor
-    bits: UInt8  # bits of the states below those of a signal,
-    drop: UInt8  # and bits that products leave out
+    bits: UInt8  # fraction bits of the states beyond a signal's,
+    drop: UInt8  # and bits that products drop
 
 
 class FixedExactTable(Struct):
@@ -51,8 +51,8 @@ class FixedExactTable(Struct):
     rate: Factor
     late: Factor
     inverse_late: Factor
-    bits: UInt8  # bits of the state below those of a signal,
-    drop: UInt8  # and bits that products leave out
+    bits: UInt8  # fraction bits of the states beyond a signal's,
+    drop: UInt8  # and bits that products drop
 
 
 class FixedLagState(Struct):
@@ -95,7 +95,7 @@ def constants(t: FixedLagTables) -> Iterator[Constants]:
 
 @dataclass(frozen=True)
 class LagFormats(Coded):
-    """A lag with the sizes of its signals: bits of its states below a signal's, and those dropped before a product."""
+    """A lag with its signals' sizes, its states' fraction bits beyond a signal's, and bits dropped before a product."""
 
     one: LagNumbers
     sizes: LagSizes
@@ -104,7 +104,7 @@ class LagFormats(Coded):
 
     @cached_property
     def _roundings(self) -> tuple[float, float, float]:
-        """Roundings of the output, of the state in the inverse, and of the answer, in units of signals."""
+        """Rounding errors of the output, of the state in the inverse, and of the answer, in units of signals."""
         exact, rate, second, late = self.one.exact, self.one.rate, self.one.second, self.one.late
         state, scale, given = 2.0**-self.bits, 2.0**self.drop, self.sizes.given
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
@@ -118,12 +118,12 @@ class LagFormats(Coded):
 
     @property
     def arrived(self) -> float:
-        """Roundings of the output in front of the plays."""
+        """Rounding errors of the output in front of the plays."""
         return self._roundings[0]
 
     @property
     def follows(self) -> float:
-        """Share of a change of the input that reaches the output in the same sample."""
+        """Fraction of a change of the input that reaches the output in the same sample."""
         return 1.0 if self.one.exact else self.one.rate * (1.0 + 2.0 * self.one.second)
 
     def led(self, error: float, code: float, same: bool, turning: bool) -> float:
@@ -203,7 +203,7 @@ def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
 
 @jit
 def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     if t.exact[j]:
         late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
         reached = s.inverted.next[j] + late

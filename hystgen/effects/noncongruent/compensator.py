@@ -1,4 +1,4 @@
-"""Bent plays for a compensator: a polynomial, or more or less than the play around a centre."""
+"""Bent plays for a compensator: by a polynomial, or by a bump or a dip around a centre."""
 
 from __future__ import annotations
 

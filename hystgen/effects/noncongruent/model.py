@@ -41,7 +41,7 @@ LOWEST, HIGHEST = -0.8, 2.5
 """Smallest and largest amplitude of a bump from which a search starts."""
 
 EVEN = 1e-6
-"""[relative] A density as far below its ends as above them, within this, is taken for a bump rather than a dip."""
+"""[relative] A density that falls below its ends as far as it rises above them, to within this, counts as a bump."""
 
 
 class _Noncongruent(Effect):
@@ -56,7 +56,7 @@ class _Noncongruent(Effect):
     compensation: ClassVar[str] = "exact: one equation per sample is solved"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """There must be plays to bend."""
+        """A problem unless the model has plays to bend."""
         yield from without_plays(thresholds)
 
     @abstractmethod
@@ -96,7 +96,7 @@ class PlayFunctions(_Noncongruent):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One list for each play."""
+        """A problem unless there is one list for each play."""
         yield from super().problems(thresholds)
         yield from not_one_a_play("coefficients", self.coefficients, thresholds, "list")
 
@@ -158,8 +158,8 @@ class LoopCentre(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre within the drive, width; tried if a cubic explains a part of the error. A search starts at
-        the bump of the cubic's density: from far away it would not find the position.
+        """Amplitude, centre within the drive range, width; tried if a cubic explains part of the error. A search starts
+        at the bump of the cubic's density: from far away it would not find the position.
         """
         if len(about.thresholds) < 2:
             return []

@@ -29,7 +29,7 @@ from hystgen.plays.slots import Reals
 
 
 class Movement:
-    """How plays (n + 1) move whose thresholds grow with the rate, or that relax.
+    """How plays (n + 1) move that relax, or whose thresholds grow with the rate.
 
     Plays that relax move as in the forward model. Thresholds that grow with the rate have a bounded inverse only while
     `sum p_i beta_i < T/2 sum p_i` holds for every number of plays that slide together. Where it does not, plays that
@@ -61,7 +61,7 @@ class Movement:
 
     @property
     def in_order(self) -> bool:
-        """Whether none yields faster than one with a smaller threshold."""
+        """Whether no play yields faster than one with a smaller threshold."""
         return self.exponent >= 1.0 if self.betas is None else len(set(self.betas.tolist())) == 1
 
     def stood_in_for(self, seconds: float) -> bool:
@@ -69,7 +69,7 @@ class Movement:
         return self.betas is not None and not self.by_threshold(seconds)
 
     def falling(self, seconds: float, steep: float) -> float:
-        """A threshold that grows faster than the input moves takes its play back."""
+        """As in `Mover`: a threshold that grows faster than the input moves pushes its play back."""
         if self.betas is None:
             return 0.0
         return steep * float(np.sum(self.weights[1:] * np.minimum(0.0, 1.0 - self.betas / seconds)))
@@ -89,7 +89,7 @@ class Movement:
         return Moved(kind, first, second, no_yields, 0.0)
 
     def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]:
-        """As in `Mover`; a nonlinear dashpot has a stretch that is too slow for its play to follow."""
+        """As in `Mover`; with a nonlinear dashpot, plays may be too slow to follow at all."""
         p = self.weights
         if self.dashpot:
             yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
@@ -116,7 +116,7 @@ class Movement:
         return found
 
     def disorder(self, rows: Array, top: float) -> float:
-        """By how much plays can leave the order of their thresholds, with stretches up to `top`."""
+        """By how much plays can leave the order of their thresholds, for stretches up to `top`."""
         return disorder(rows, top) if self.dashpot else 0.0
 
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
@@ -124,7 +124,7 @@ class Movement:
         return stretch_error(self.dashpot, self.scale, seconds, rows, ways, held) if self.dashpot else 0.0
 
     def after(self, plays: Array, x: float, w: float, seconds: float) -> Array:
-        """The plays (n + 1) after the step, from where they were."""
+        """The plays (n + 1) after a step from x to w, given the plays before it."""
         out = np.empty_like(plays)
         out[0] = w
         if self.by_threshold(seconds):
@@ -153,17 +153,17 @@ BEGIN, C0, C1, C2, C3 = range(5)
 """Columns of a piece: where it begins, and the coefficients of a cubic in the distance from there."""
 
 LEAST_STRETCH = 1e-6
-"""[largest thresholds] Below this a stretch loses a fixed share of itself; a range has some 1e5 of these."""
+"""[largest thresholds] A stretch below this loses a fixed fraction of itself; a range has some 1e5 of these."""
 
 LEAST_YIELD = 2.0**-40
-"""Share of a stretch that it loses in a step, below which the loss counts as proportional: next to nothing in 2^28
-steps."""
+"""A stretch that loses less than this fraction in a step is taken to lose in proportion to its size: next to nothing in
+2^28 steps."""
 
 LONGEST = 4.0
-"""Largest ratio of a piece's end to its beginning: even laws steeper than a dashpot's are cubic over two octaves."""
+"""Largest ratio of a piece's end to its beginning: over two octaves a cubic fits even laws steeper than a dashpot's."""
 
 YIELD_ERROR = 1e-3
-"""Largest relative error of the loss of a stretch: plays' lag behind their input is off by a share of
+"""Largest relative error of the loss of a stretch: the relative error of plays' lag behind their input is
 `YIELD_ERROR/exponent`, while records determine time constants to 1 % at best."""
 
 
@@ -187,9 +187,9 @@ def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tu
 
 
 def seen_share(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
-    """The share of the move `way` up to which the input counts as standing still.
+    """The fraction of the move `way` at which the input is taken to stand still.
 
-    Exact for a linear dashpot as stiff as this one in steady motion by `way` a step.
+    Exact for a linear dashpot as stiff as this one in steady motion by `way` per step.
 
     With `s = T f'(e)`, `E = exp(-s)` and `M = (1 - E)/s`: `(1 - M)/(1 - E)`, 1/2 for s = 0.
     """
@@ -247,8 +247,8 @@ def stretch_error(
     """Largest difference between the stretches of plays by the table and by the law.
 
     `ways`: the largest move of the input in a step, and overall; `held` (K,): rounding error of the loss on each piece.
-    Of two plays, one by the law and one by the table, neither gains on the other once it is stretched by that much
-    less.
+    If one play follows the law and another the table, neither gains on the other once it is stretched less by that
+    much.
     """
     end = LONGEST * rows[-1, BEGIN] if len(rows) > 1 else LEAST_STRETCH * scale
     x = np.append(0.0, np.geomspace(1e-3 * (rows[1, BEGIN] if len(rows) > 1 else end), end, 6000))
@@ -264,10 +264,10 @@ def stretch_error(
 
 
 def disorder(rows: Array, top: float) -> float:
-    """By how much a play can be stretched farther than one with a smaller threshold, stretches up to `top`.
+    """By how much a play can be stretched farther than one with a smaller threshold, for stretches up to `top`.
 
-    Of two plays stretched by x and less in a step, the first keeps at least as much of its stretch as the other, except
-    for where the loss rises faster than the stretch.
+    Of two plays, the one that is stretched farther stays so in a step, except where the loss rises faster than the
+    stretch.
     """
     x = np.linspace(0.0, top, 6001)
     k = np.searchsorted(rows[:, BEGIN], x, side="right") - 1
@@ -384,7 +384,7 @@ def yielding(t: MovingTables, x: Any) -> tuple[Any, Any]:
 
 @jit
 def yields(t: MovingTables, x: Any) -> Any:
-    """The yield alone."""
+    """The yield that `yielding` returns, alone."""
     y, _ = yielding(t, x)
     return y
 
@@ -397,7 +397,7 @@ def seen(t: MovingTables, way: Any) -> Any:
 
 @jit(inline=True)
 def unchanged(t: MovingTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """The move of a play for its yield, and the reverse."""
+    """A yield as the move of a play, and the reverse: the same number in floating point."""
     return x
 
 
@@ -409,7 +409,7 @@ def share_of(factors: Reals, i: int, x: Any) -> Any:
 
 @jit
 def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
-    """Move viscous plays with one time constant with their input w. Returns their sum."""
+    """Move viscous plays with one time constant as their input goes to w. Returns their sum."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
     for i in range(1, len(r)):
@@ -422,8 +422,8 @@ def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
 
 @jit
 def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
-    """Input of viscous plays at which their sum is h: first without a stretched play, then with those stretched on the
-    way to it."""
+    """Input of viscous plays at which their sum is h: first as if no play were stretched, then with each play that is
+    stretched on the way there."""
     r, p = plays.threshold, plays.weight
     rest = r[0]
     for i in range(1, len(r)):
@@ -448,7 +448,7 @@ moved, move, put, rest = movement(share_of, yields, seen, unchanged, unchanged, 
 @jit
 def tried(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, moving: bool, w: Any) -> tuple[bool, Any, Any]:
     """Whether play i moves when the input of the plays goes to w, or comes to rest there; the value it reaches, and its
-    share of a further change of w."""
+    change per further change of w."""
     q, x = s.play[i], s.play[0]
     one = t.number[ONE]
     if t.moves == DASHPOT and moving:

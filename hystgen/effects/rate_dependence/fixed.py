@@ -22,7 +22,7 @@ YIELD_BEGIN, YIELD_C0, YIELD_C1, YIELD_C2, YIELD_C3, YIELD_SCALE, YIELD_LIFT = r
 def whole_yields(
     law: Callable[[float], tuple[float, float]], begins: Sequence[int], end: int, step: float, bits: int
 ) -> list[tuple[int, ...]]:
-    """Pieces of the yields of stretches up to `end`, cubic between whole knots; the first one is straight."""
+    """Pieces of the yields of stretches up to `end`, cubic between integer knots; the first one is straight."""
     knots = sorted({0, end + 1, *(x for x in begins if 0 < x <= end)})
     while knots[-2] and LONGEST * knots[-2] < end:  # beyond the last piece in floating point
         knots.insert(-1, int(LONGEST) * knots[-2])
@@ -95,7 +95,7 @@ def share_of(factors: Reals, i: int, x: int) -> int:
 
 @jit
 def relaxing_follow(t: FixedMovingTables, plays: FixedPlayTables, s: State, w: int) -> int:
-    """Move viscous plays with one time constant with their input w. Returns their sum. In spite of rounding,
+    """Move viscous plays with one time constant as their input goes to w. Returns their sum. Despite rounding,
     neighbouring plays rest at most as far apart as their thresholds."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
@@ -116,8 +116,8 @@ def relaxing_follow(t: FixedMovingTables, plays: FixedPlayTables, s: State, w: i
 
 @jit
 def relaxing_input(t: FixedMovingTables, plays: FixedPlayTables, s: State, h: int) -> int:  # noqa: ARG001  as in floating point
-    """Input of viscous plays at which their sum is h. With the input where play 1 rests, none is stretched; beyond that
-    they are solved for like plain plays, with smaller slopes."""
+    """Input of viscous plays at which their sum is h. With the input at play 1, none is stretched; from there they are
+    solved for like plain plays with smaller slopes."""
     s.play[0] = s.play[1]
     return loop_solve(t.relaxed, s, h)
 

@@ -82,7 +82,7 @@ def mean_decay(x: float) -> float:
 
 @jit
 def bent_decay(x: float) -> float:
-    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, the sum of squares that remains of a growing disturbance; 1/6 at 0."""
+    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, or `int_0^x exp(s - x) (1 - exp(-s))^2 ds/(2 x^3)`."""
     if x < 0.1:
         return 1 / 6 - x * (1 / 6 - x * (11 / 120 - x * (13 / 360 - x * 57 / 5040)))
     decay = math.exp(-x)
@@ -91,9 +91,9 @@ def bent_decay(x: float) -> float:
 
 @jit
 def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
-    """Increment of `e` over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
+    """Gain of `e` in a step of `e' = speed - q` with `q ~ e^m`: six Taylor terms from `c1` on, and the last of them.
 
-    The terms `q_k` of q follow from `e q' = m q e'`; the terms of e from the second on are `-step q_(k-1)/k`.
+    The terms `q_k` of q follow from `e q' = m q e'`; from the second on, the terms of e are `-step q_(k-1)/k`.
     """
     d = 1.0 / e
     q1 = m * c1 * q0 * d
@@ -111,7 +111,7 @@ def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float
 
 @jit
 def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
-    """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
+    """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left at e = 0.
 
     The linear case is exact. Otherwise it is computed in pieces: by the equation's Taylor series where friction is
     slow, and where it is fast by a scheme that is exact for the equation linearised about `e` (exponential
@@ -191,7 +191,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
 def relaxed(
     x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
 ) -> float:
-    """State of a viscously following play after its input has moved from `x` to `target` in the time `left`.
+    """State of a viscous play after its input has moved from `x` to `target` in the time `left`.
 
     `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
     """
@@ -246,7 +246,7 @@ class _RateDependence(Effect):
     rank: ClassVar[float] = 4
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """There must be plays to depend on the rate."""
+        """A problem unless the model has plays with a threshold."""
         yield from without_plays(thresholds)
 
     @abstractmethod
@@ -288,7 +288,7 @@ class ThresholdRate(_RateDependence):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One beta for each play."""
+        """A problem unless there is one beta for each play."""
         yield from super().problems(thresholds)
         yield from not_one_a_play("betas", self.betas, thresholds)
 
@@ -404,7 +404,7 @@ SHAPES = (ThresholdRate, RelaxingPlays)
 
 
 def load() -> None:
-    """Compile the recursions, or read them from the cache, on two samples."""
+    """Compile the recursions, or load them from the cache, by running them on two samples."""
     w, one = np.arange(2.0), np.ones(1)
     dilated_plays(w, w, one, one, np.zeros(1), np.empty((1, 2)))
     relaxing_plays(w, one, one, 1.0, 1.0, 1.0, np.zeros(1), np.empty((1, 2)))

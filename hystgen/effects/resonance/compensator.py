@@ -50,7 +50,7 @@ class ModeNumbers(One):
         return self.largest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output in floating point with unit roundoff `u`, for inputs up to `size`."""
+        """Rounding errors of the output in floating point with unit roundoff `u`, for inputs up to `size`."""
         keep, turn, swing, lead, push = map(abs, self.table)
         off, rate = (1.0 + self.largest) * size, self.fastest * size
         steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
@@ -93,8 +93,8 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
 
 
 class ModeTable(Struct):
-    """In a step, a mode's two states, output minus input and the rate of this difference, change by shares of
-    themselves (keep, swing), of each other (turn), and of a change of the input (lead, push)."""
+    """In a step, a mode's two states, output minus input and the rate of this difference, change in proportion to
+    themselves (keep, swing), to each other (turn), and to a change of the input (lead, push)."""
 
     keep: Real
     turn: Real
@@ -131,7 +131,7 @@ def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa:
 
 @jit
 def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]

@@ -1,4 +1,4 @@
-"""A mode as a block of the forward operator in fixed point, with states that have bits below a signal's.
+"""A mode as a block of the forward operator in fixed point, with states finer than a signal.
 
 A change of the input enters `off` in full, minus the part that the output follows in the same step: for a mode far
 below the sample rate this part is a small factor, with 31 bits of its own.
@@ -24,14 +24,14 @@ Row = tuple[tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], 
 
 
 class FixedModeTable(Struct):
-    """As in floating point; a change of the input adds `late` times the change minus the change itself, and `push`."""
+    """As in floating point; a change of the input adds `late - 1` of it to `off` and `push` of it to `rate`."""
 
     keep: Factor
     turn: Factor
     swing: Factor
     late: Factor
     push: Factor
-    bits: UInt8  # bits of the states below those of a signal,
+    bits: UInt8  # fraction bits of the states beyond a signal's,
     drop: UInt8  # bits that products with states drop,
     lift: UInt8  # and bits that products with a change of the input drop
 
@@ -61,13 +61,13 @@ def row(one: ModeNumbers, size: float) -> Row:
 
 
 def rounding(one: ModeNumbers, table: Row, size: float) -> float:
-    """Roundings of the output, in signals, for inputs up to `size` signals."""
+    """Rounding errors of the output, in signals, for inputs up to `size` signals."""
     *_, bits, drop, lift = table
     state, most = 2.0**-bits, largest_state(one, size)
     keep, turn, swing, lead, push = one.table
 
     def products(own: float, enters: float) -> float:
-        """Roundings of a state's change in a step: two products with states, and one with a change of the input."""
+        """Rounding errors of a state's change in a step: two products with states, one with a change of the input."""
         found = state * (1.0 + 2.0**drop * (abs(own) + abs(turn)) + 0.5 * 2.0**lift)
         found += most * sum(missed(x * 2.0**drop) * 2.0**-drop for x in (own, turn))
         scale = 2.0 ** (bits - lift)
@@ -85,7 +85,7 @@ class ModeFormats(Coded):
     row: Row
 
     def there(self, size: float, signal: float) -> float:
-        """Roundings of the output for inputs up to `size`, with signals in units of `signal`."""
+        """Rounding errors of the output for inputs up to `size`, with signals in units of `signal`."""
         return rounding(self.one, self.row, size / signal) * signal
 
 
@@ -109,7 +109,7 @@ def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
 
 @jit
 def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
     rate = s.rate[j]

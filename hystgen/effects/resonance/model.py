@@ -110,7 +110,7 @@ class _Mode(Effect):
         return np.stack([c, s, ramp, step])
 
     def denominator(self, step: float) -> tuple[float, float]:
-        """`a1`, `a2` of the exact poles at steps of this length, `z^2 + a1 z + a2`."""
+        """`a1`, `a2` of the polynomial `z^2 + a1 z + a2` whose zeros are the exact poles at steps of this length."""
         zeta, angle = self.damping, 2.0 * math.pi * self.frequency * step
         if zeta < 1.0:
             decay = math.exp(-zeta * angle)
@@ -260,6 +260,6 @@ SHAPES = (Resonance, PartMode)
 
 
 def load() -> None:
-    """Compile the recursions, or read them from the cache, on two samples."""
+    """Compile the recursions, or load them from the cache, by running them on two samples."""
     one = np.ones(1)
     ring(np.arange(2.0)[None, :], one, one, one, one, 1.0, np.empty((1, 2)))

@@ -36,7 +36,7 @@ def solve(t: Any, s: Any, y: Any) -> Any:
 
 
 def absorb(t: Any, s: Any, x: Any) -> Any:
-    """Take the input x at this sample. Returns the output."""
+    """Absorb the input x at this sample. Returns the output."""
     change = x - s[BEFORE]
     off = s[OFF]
     rate = s[RATE]

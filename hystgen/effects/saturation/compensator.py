@@ -20,7 +20,7 @@ STEEP = 4.0
 
 
 class Smooth(Map):
-    """A tanh."""
+    """A smooth limit, a tanh."""
 
     def __init__(self, effect: TanhSaturation) -> None:
         super().__init__(effect)

@@ -125,7 +125,7 @@ class Stops(_Saturation):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """The problem of the two stops unless lower < upper."""
+        """A problem unless lower < upper."""
         if not self.lower < self.upper:
             yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"
 

@@ -104,7 +104,7 @@ class SensorCurve(_Sensor):
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """The problems of not having as many values as knots, both rising."""
+        """Problems unless there are as many values as knots, and both rise."""
         yield from not_as_many("values", self.values, "knots", self.knots)
         for key in ("knots", "values"):
             for k, (one, other) in enumerate(zip(getattr(self, key)[:-1], getattr(self, key)[1:], strict=True), 1):

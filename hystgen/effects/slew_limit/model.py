@@ -248,7 +248,7 @@ SHAPES = (SlewLimit, SuddenSlewLimit)
 
 
 def load() -> None:
-    """Compile the recursions, or read them from the cache, on two samples."""
+    """Compile the recursions, or load them from the cache, by running them on two samples."""
     two, one = np.arange(2.0), np.ones(1)
     limit(two, one, one, np.empty(2), np.empty(1))
     sudden(two, two, MIDDLE, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))

@@ -55,7 +55,7 @@ class GainTable(Struct):
 
 
 class GainNumbers(GainTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 class GainState(Struct):
@@ -110,7 +110,7 @@ def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, float, float]:
     """Constants of a block for an output that spans `span`: rates, reference, and the limits of the temperature.
 
-    Beyond these limits the gain would leave its own, or the offset alone would exceed the span.
+    Beyond these limits the gain would exceed its own limits, or the offset alone would exceed the span.
     """
     ends = [math.inf]
     if effect.gain_per_degree:
@@ -166,7 +166,7 @@ def gain_verbs(by: Gains) -> Verbs:
 
 
 class HeatTable(Struct):
-    """Own heat: degrees per amount of heat, and the share lost per step."""
+    """Own heat: degrees per amount of heat, and the fraction lost per step."""
 
     rate: Real
     per_amount: Real
@@ -177,7 +177,7 @@ class HeatTable(Struct):
 
 
 class HeatNumbers(HeatTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 class HeatState(Struct):
@@ -206,7 +206,7 @@ class FrictionTable(Struct):
 
 
 class FrictionNumbers(FrictionTable):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
     one: Signal
     two: Signal
@@ -294,7 +294,7 @@ def most_amount(effect: OwnHeat, ends: tuple[float, float], move: float) -> floa
 
 
 def lost(effect: OwnHeat, seconds: float) -> float:
-    """Share of a temperature rise that is lost in a step."""
+    """Fraction of a temperature rise that is lost in a step."""
     return -math.expm1(-seconds / effect.time_constant)
 
 
@@ -322,8 +322,8 @@ def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: f
 
 
 def reached(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
-    """The largest temperature rise from a drive that moves by at most `move` per step within `ends`, and the least and
-    largest gain up to that rise."""
+    """The largest temperature rise from a drive that moves by at most `move` per step within `ends`, and the smallest
+    and largest gain up to that rise."""
     warmest = most_at_once(effect, ends, move, seconds) / lost(effect, seconds)
     gain = min(max(1.0 + effect.gain_per_degree * warmest, LEAST_GAIN), LARGEST_GAIN)
     return warmest, min(gain, 1.0), max(gain, 1.0)
@@ -349,11 +349,11 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
 
 
 def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
-    """Error of the rise from the rubbing plays, in degrees; `emitted`: against the continuum of plays."""
+    """Error of the rise caused by the rubbing plays, in degrees; `emitted`: against the continuum of plays."""
     widths = thresholds(effect, speed.ends)
     if not widths:
         return 0.0
-    # each play is off by one rounding, or by three if it stays because another play does
+    # a play is off by one rounding, or by three if it stays only because another one does
     amount = len(widths) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + widths[-1])
     amount += (len(widths) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
     found = amount * per_amount(effect, speed.ends, speed.seconds)
@@ -405,22 +405,22 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
 
 @jit
 def heat_way(before: N, v: N) -> N:
-    """The move of the drive's signed square."""
+    """Absolute change of the drive's signed square."""
     way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
     return way if way >= zero(v) else -way
 
 
 @jit
 def warmed(t: HeatNumbers, s: HeatState, j: int, amount: Scalar) -> Scalar:
-    """Take the heat of a step. Returns the temperature rise."""
+    """Absorb the heat of a step. Returns the temperature rise."""
     return added(s, j, t.per_amount[j] * amount - t.rate[j] * s.high[j])
 
 
 def heat_verbs(
     by: Gains, memory: Callable[..., object], warmed: Answer, narrowed: Answer, entered: Answer
 ) -> Verbs:
-    """The verbs of own heat in an arithmetic. `warmed`: as above; `narrowed`: a gain within limits from which rounding
-    may have taken it; `entered`: a drive as a position of the rubbing plays."""
+    """The verbs of own heat in an arithmetic. `warmed`: as above; `narrowed`: a gain brought back within limits that
+    rounding may have exceeded; `entered`: a drive as a position of the rubbing plays."""
     times, scaled, put, followed, rub = by.times, by.scaled, by.put, following(by), friction_move(entered)
 
     @jit
@@ -466,9 +466,9 @@ def friction_constants(t: Any, kind: BlockKind = FRICTION_KIND, each: int = 1) -
 
 
 def friction_move(entered: Answer) -> Answer:
-    """A function that moves the drive to v; at first the plays rest at `before`. It returns the sum of their moves,
-    each times its threshold as an odd multiple of the first. If a play stays, so do those with larger thresholds.
-    `entered`: a drive as a position of the plays."""
+    """A function that moves the drive to v; the first time, the plays start at `before`. It returns the sum of their
+    moves, each times its threshold as an odd multiple of the first. If a play stays, so do those with larger
+    thresholds. `entered`: a drive as a position of the plays."""
 
     @jit
     def move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:

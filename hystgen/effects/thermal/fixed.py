@@ -36,10 +36,10 @@ from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
-"""[share of the signal] Error of a gain that is linear in a temperature: one product."""
+"""[fraction of the signal] Error of a gain that is linear in a temperature: one product."""
 
 FACTOR_ERROR = 2.0**-MANTISSA_BITS
-"""[share of a product] Error of a factor: half a last bit. The reference temperature has the same error."""
+"""[fraction of a product] Error of a factor: half its last bit. The reference temperature has the same error."""
 
 TEMPERATURE_BITS = 37
 """Fraction bits of an internal temperature, so that temperatures up to 512 degC can be multiplied like any signal."""
@@ -57,19 +57,19 @@ class FixedGainTable(Struct):
     reference: Int64
     coldest: Int64
     hottest: Int64
-    bits: UInt8  # of a temperature below a code
+    bits: UInt8  # left shift from a caller's code to a temperature
 
 
 class FixedGainNumbers(FixedGainTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 KIND = replace(floating.KIND, table=FixedGainTable)
 
 
 def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainNumbers:
-    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: of a
-    temperature below a code; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
+    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: left shift
+    from a code to a temperature; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
     for per_degree, offset_per_degree, *ends in rows:
@@ -109,7 +109,7 @@ def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
 
 
 def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainNumbers:
-    """The tables of several gains, by `tables`."""
+    """The tables of several gains, made by `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
 
@@ -124,8 +124,8 @@ AMOUNT_BITS = 50
 
 
 class FixedHeatTable(Struct):
-    """Own heat: degrees gained per amount of heat, the share lost per step, and the temperature rise up to which gain
-    and offset follow."""
+    """Own heat: degrees gained per amount of heat, the fraction lost per step, and the temperature rise up to which
+    gain and offset follow."""
 
     rate: Factor
     per_amount: Factor
@@ -139,7 +139,7 @@ class FixedHeatTable(Struct):
 
 
 class FixedHeatNumbers(FixedHeatTable, GainLimits):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 class FixedHeatState(Struct):
@@ -157,11 +157,11 @@ HEAT_KIND = replace(floating.HEAT_KIND, table=FixedHeatTable, state=FixedHeatSta
 class FixedFrictionTable(FrictionTable):
     """Rubbing plays, as in floating point."""
 
-    bits: UInt8  # of a play below a drive code
+    bits: UInt8  # fraction bits of a play, in drive codes
 
 
 class FixedFrictionNumbers(FixedFrictionTable, FrictionNumbers):
-    """The same with constants that are not in the table in C."""
+    """The same, plus constants that are not in the C table."""
 
 
 FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
@@ -173,8 +173,8 @@ FixedHeatMemory = RubbingMemory[FixedHeatState]
 
 @dataclass(frozen=True)
 class Heat(Coded):
-    """Own heat in fixed point: its table, thresholds of the rubbing plays and their bits below a drive code, and the
-    largest error of the temperature against the same recursion without rounding, degrees."""
+    """Own heat in fixed point: its table, thresholds of the rubbing plays and their fraction bits in drive codes, and
+    the largest error of the temperature against the same recursion without rounding, degrees."""
 
     table: tuple[object, ...]
     thresholds: tuple[int, ...]
@@ -201,7 +201,7 @@ def heat(
     OverflowError if a number does not fit."""
     rate, per_amount, per_degree, offset_per_degree, hottest = numbers
     if thresholds:
-        bits = STATE_BITS - code_bits  # of a play below a drive code
+        bits = STATE_BITS - code_bits  # fraction bits of a play, in drive codes
         unit_of_drive = lsb / 2.0**bits
         rows = [round(r / unit_of_drive) for r in thresholds]
         most = (2 * largest << bits) * len(rows) ** 2
@@ -245,7 +245,7 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
 
 @jit
 def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
-    """Take the heat of a step. Returns the temperature rise without its lowest bits."""
+    """Absorb the heat of a step. Returns the temperature rise without its lowest bits."""
     warmer = times(nearest(amount, t.coarse[j]), t.per_amount.mantissa[j], t.per_amount.shift[j]) << t.lift[j]
     lost = times(s.high[j] >> t.drop[j], t.rate.mantissa[j], t.rate.shift[j])
     s.high[j] = s.high[j] + (warmer - lost)
@@ -254,7 +254,7 @@ def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
 
 @jit
 def narrowed(t: FixedHeatNumbers, j: int, gain: int) -> int:
-    """A gain within limits, from which rounding may have taken it."""
+    """Bring a gain back within limits that rounding may have exceeded."""
     return inside(gain, t.least[j], t.largest[j])
 
 

@@ -297,5 +297,5 @@ SHAPES = (LoggedThermal, SelfHeating, HysteresisHeating)
 
 
 def load() -> None:
-    """Compile the recursions, or read them from the cache, on two samples."""
+    """Compile the recursions, or load them from the cache, by running them on two samples."""
     lost(np.arange(2.0), 1.0, np.empty(2), np.empty(1))

@@ -16,7 +16,7 @@ from hystgen.plays.slots import Reals, StepState
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their smallest steps, are an int32_t in C
 
 Kink = tuple[int, int, int, int]
-"""`hystgen_kink_t`: output and input along the present move, the number of plays that follow from here on, and of
+"""`hystgen_kink_t`: output and input along the present move, the last play that follows from here on, and the number of
 corners that hold the others."""
 
 FAR = 1 << 62
@@ -33,7 +33,7 @@ class FixedCorner(Struct):
 
 
 class FixedMemory(NamedTuple):
-    """One instance in fixed point, as in floating point."""
+    """One instance in fixed point; fields as in floating point."""
 
     here: PlaceState
     undo: PlaceState
@@ -55,7 +55,7 @@ def along(m: FixedMemory, x: int) -> int:
 
 @jit
 def leave_corner(m: FixedMemory) -> None:
-    """Leave a corner here."""
+    """Leave a corner at the present point."""
     c = m.here.depth[0]
     m.corner.output[c] = m.here.output[0]
     m.corner.input[c] = m.here.input[0]
@@ -66,7 +66,7 @@ def leave_corner(m: FixedMemory) -> None:
 
 @jit
 def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> int:
-    """Where play k of a corner's block begins to follow, along the present move."""
+    """The output or input, along the present move, at which play k of a corner's block begins to follow."""
     if by_output:
         return along(m, m.corner.output[c]) + (0 if m.corner.rose[c] == m.here.rising[0] else t.reach[k])
     return along(m, m.corner.input[c]) + (0 if m.corner.rose[c] == m.here.rising[0] else t.way[k])
@@ -74,7 +74,7 @@ def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) 
 
 @jit
 def turn_back(m: FixedMemory) -> None:
-    """Turn back, leaving a corner if plays have followed."""
+    """Reverse the move and, if plays have followed, leave a corner."""
     if m.here.k[0] > 0:
         leave_corner(m)
         m.here.k[0] = 0
@@ -116,7 +116,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: int, by_output: bool) -> Kink:
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: int) -> Kink:
-    """As `find`, for a move to any input. May turn back, but moves nothing."""
+    """The same as `find` for a move to any input. May reverse the move, but moves no play."""
     if along(m, to - m.here.input[0]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)
@@ -178,9 +178,9 @@ def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) -> int:
 
 @jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: int, following: int) -> tuple[int, Kink]:
-    """The input for `output`, at most slightly outside the range, and the kink from which it is counted.
+    """The input for `output`, at most slightly outside the range, and the kink it is measured from.
 
-    May turn back, but moves nothing. Up to the output `following`, along the move, no other play begins to follow.
+    May reverse the move, but moves no play. Before the output `following`, along the move, no other play follows.
     """
     if along(m, output - m.here.output[0]) < 0:
         turn_back(m)
@@ -215,8 +215,8 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: int) ->
 
 @jit
 def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
-    """Set a start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to the
-    input at which that play begins to follow."""
+    """Set a start memory: a value for each play, or one for all. Each play becomes a block of its own, as left by a
+    move to the input at which it begins to follow."""
     aside = t.limits.offset[0]
     m.here.depth[0] = 0
     for k in range(len(t.threshold) - 1, 0, -1):

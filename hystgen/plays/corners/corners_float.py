@@ -10,7 +10,7 @@ from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, TwoReals
 from hystgen.plays.slots import Reals, StepState
 
-BOTTOM = 2  # `rose` of the bottom, which is the opposite of both directions
+BOTTOM = 2  # `rose` of the bottom corner, which counts as opposite to both directions
 
 
 class Literals(Struct):
@@ -40,7 +40,7 @@ class Start(NamedTuple):
 
     center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold play k's value
     step: int  # 0: one centre for all plays, 1: one for each
-    risen: int  # rising moves left the corners of plays up to this one, falling moves the others
+    risen: int  # corners of plays up to this one were left by rising moves, the others by falling moves
     bottom: Reals  # output, and the inputs at which a falling and a rising move passed it
     top: int  # plays from here on cannot move within the range
 
@@ -60,7 +60,7 @@ class PlaysState(Struct):
 
     next: Real  # input up to which the same plays follow and nothing is limited
     cap: Real  # input up to which the same corner applies and nothing is limited
-    behind: Real  # while no play follows: the same as `next`, on the other side
+    behind: Real  # while no play follows: the counterpart of `next` for moves in the other direction
     from_input: Real  # input and output from which the top corner's block is counted
     from_output: Real
     begin: Real  # output = start + (input - begin) gain
@@ -113,7 +113,7 @@ def along(m: Memory, x: Scalar) -> Scalar:
 
 @jit(inline=True)
 def forget_line(m: Memory) -> None:
-    """Forget the line of the last outputs, so that the next sample searches."""
+    """Forget the line of the last outputs, so that the next sample starts a new search."""
     m.plays.next[0] = m.here.input[0]
     m.plays.cap[0] = m.here.input[0]
     m.plays.behind[0] = m.here.input[0]
@@ -121,7 +121,7 @@ def forget_line(m: Memory) -> None:
 
 @jit(inline=True)
 def take_back(t: Curve, m: Memory) -> None:
-    """Put the plays back to where they were, before any corner left since then."""
+    """Restore the plays' position from before the last step; corners left since then are dropped."""
     copy_place(m.here, m.undo)
     m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
     forget_line(m)
@@ -151,7 +151,7 @@ def reverse(t: Curve, m: Memory) -> None:
 
 @jit
 def find_segment(t: Curve, k: int, end: int, way: Scalar, reach: Scalar, both: bool) -> int:
-    """The last of segments k .. end - 1 that begins before a way, and before a reach if `both`, as segment k does."""
+    """The last of segments k .. end - 1 that begins before `way` and, if `both`, before `reach`; segment k does."""
     middle = (k + end) // 2
     while middle > k:
         if (not both or reach > t.reach[middle]) and way > t.way[middle]:
@@ -164,8 +164,8 @@ def find_segment(t: Curve, k: int, end: int, way: Scalar, reach: Scalar, both: b
 
 @jit
 def move_or_stop(t: Curve, m: Memory, c: int, x: Scalar, end: Scalar, stop: bool) -> bool:
-    """Move the plays in the block of corner c to the input x, or stop them at the sum `end`: in any case if `stop`,
-    else if it is a limit and comes first. Both are along the move. Returns whether they stop."""
+    """Move the plays in corner c's block to the input x, or stop them where their sum is `end`: always if `stop`,
+    otherwise only at a limit that they reach first. x and `end` are along the move. Returns whether they stop."""
     rising = m.here.rising[0]
     origin = m.corner.passed[c, 1 - rising]
     cap: Scalar = m.corner.passed[c, rising]
@@ -232,7 +232,7 @@ def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
 
 @jit
 def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
-    """Move the plays to any input. Returns whether the limit comes first, where they then stop."""
+    """Move the plays to any input, or only to the limit if they reach it first. Returns whether they do."""
     if along(m, to) < along(m, m.here.input[0]):
         reverse(t, m)
     x = along(m, to)
@@ -254,7 +254,7 @@ def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
 
 @jit
 def move_in_block(t: Curve, m: Memory, to: Scalar) -> bool:
-    """Move on to an input short of `cap`, where more plays of the block follow. False if a search would be faster."""
+    """Go on to an input short of `cap` where more plays of the block follow. Returns False if a search must."""
     way = along(m, to - m.plays.from_input[0])
     k = m.here.k[0] + 1
     while way > t.way[k + 1]:
