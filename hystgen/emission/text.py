@@ -41,7 +41,7 @@ _WAYS = [
 _CHOICE = ("? ", ": ")
 """Beginnings of lines whose continuation is indented further."""
 _GOOD = 7
-"""The first this many of these come before the rest; among them, the position with the fewest open parentheses wins."""
+"""The first `_GOOD` ways are preferred to the rest; among equals, the position in the fewest parentheses wins."""
 
 
 def literal(x: Number) -> str:
