@@ -70,8 +70,8 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path through kinks, each reached to within one last bit, of the current memory and of that of init and
-    reset."""
+    """A path through kinks of the current memory and of the memories after init and reset, each reached to within one
+    last bit."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits.drive[0])
     memory = _Textbook(tables)

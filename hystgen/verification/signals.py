@@ -178,8 +178,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
     """From init to a reference, sometimes 0, held until a quiet drive stops; then a settle at that drive, often with
-    another drive committed right after it, and a further move. The drive at which it comes to rest shows what a settle
-    has left of the past."""
+    another drive committed right after it, and a further move. The drive at which it comes to rest shows any trace of
+    the past that a settle leaves."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))
