@@ -156,7 +156,7 @@ class Bounds:
         lsb = float(self.inner.output_lsb)
         coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
         found: list[tuple[Coded, float, CodedGain | None]] = []
-        reached = 0.0  # largest input of the gains: the output's ends are nearer than the sizes that signals can hold
+        reached = 0.0  # largest input of the gains, from the output's ends, a closer bound than the signals' sizes
         for name in parts:
             for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):
                 gain = each.gain(reached or size, speed, coding)
@@ -345,7 +345,7 @@ class Bounds:
 
     def _gain(self) -> float:
         """As `_gain_at_once`, for plays that have seen only the drives of their own compensator."""
-        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but held drives can be farther apart
+        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but drives at rest can differ more
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))

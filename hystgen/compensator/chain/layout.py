@@ -220,7 +220,7 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """modes that the taps keep from ringing, besides their delay and inverted modes"""
+    """modes that the taps keep from ringing, in addition to compensating a delay and inverting other modes"""
     codes: Codes | None = None
     """only in fixed point"""
 

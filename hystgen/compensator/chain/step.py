@@ -128,7 +128,7 @@ class Conversions(NamedTuple):
     level_signal: Answer
     drive_code: Answer
     output_code: LimitedAnswer  # with status bits
-    entered_travel: Answer  # a travel as verification sets it
+    entered_travel: Answer  # a travel that verification sets
     shared: Answer  # a share of a signal
 
 
@@ -227,7 +227,7 @@ def made_of(
 
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
-        """Settle everything."""
+        """Record that the lag is at rest."""
         s.steady.way[0] = t.limits.zero[0]
         s.steady.moved[0] = t.limits.zero[0]
         s.steady.rises[0] = 1
