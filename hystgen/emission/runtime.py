@@ -26,7 +26,7 @@ FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS
 """Macros that state facts about a model. Conditions on them are decided at emission; others stay in the C."""
 
 OPERATORS = ("forward", "inverse")
-"""A file with functions `hystgen_operator_..` serves both operators: it is emitted once for each, with its name."""
+"""Files with `hystgen_operator_..` functions serve both operators: they are emitted once for each, under its name."""
 
 FLOAT_KERNELS = (
     "front/tanh_{bits}.c",

@@ -1,9 +1,8 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-Statements are broken by one rule that looks only at their code. Line breaks in the file they come from do not count:
-those suit the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of
-effects but not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes
-anywhere.
+Statements are broken by one rule that looks only at their code. Line breaks in the source file do not count: they suit
+the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of effects but
+not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
 from __future__ import annotations
