@@ -29,7 +29,7 @@ COMMITTED, THERE = 0.6, 0.7
 @dataclass(frozen=True)
 class Path:
     """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
-    operator after the call (meaningless for init), `risen` whether the move to it rose."""
+    operator after the call (meaningless for init), `risen` whether the output rose."""
 
     op: Bytes
     drive: NDArray[np.float64]

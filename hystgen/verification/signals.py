@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of this many calls, one of these fractions of the calls leaves the status unread
+# In each part of `PART` calls, the status is left unread after one of these fractions of the calls
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
