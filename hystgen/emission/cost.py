@@ -309,7 +309,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         plays.DASHPOT: ((4 + factor, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked, tanh = _bent(m)
-    # contributions computed per play: also the one at rest if plays relax, or of plays that stay in fixed point
+    # contributions computed per play: a second one if plays relax (at rest) or, in fixed point, are plain (unmoved)
     twice = 1 + (m.moves == plays.RELAXING or (m.moves == plays.PLAIN and isinstance(m, plays.FixedMovingTables)))
     tries, beside = _tries(m) if inverse else (0, (0, 0))
     tried = 1 + moved[0] + bent, 1 + moved[1] + looked
