@@ -11,9 +11,9 @@ Inverse: the drive as sent is an exact input of the exact model, whose output th
 residual eta. This requires a solution to stop where the next play would begin to follow: on the linear piece up to that
 point, of slope P_k, an output error eta becomes eta / P_k in w; beyond it, that error in w would meet a steeper slope.
 The loop engine stops at that point; the corner engine switches to the steeper piece early, by the largest rounding
-error. Neither answers a move with a move in the opposite direction, which would have the same effect on plays that
-follow after a turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of
-the plays (the sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits affect both equally.
+error. Neither answers a move with one in the opposite direction: plays that follow after such a turn would have the
+same effect. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays
+(the sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits affect both equally.
 
 With two branches, two drives can give the same output, one on each branch, and rounding decides between them if the
 reference moves by less than a rounding error. Both outputs are within the bound; the drives then differ by the gap

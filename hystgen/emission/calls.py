@@ -136,7 +136,7 @@ def _swing(model: Model) -> float:
 
 def check_names(models: Sequence[Model]) -> None:
     """Raise ValueError if two models make files of the same name."""
-    names = [model.name.lower() for model in models]  # as on some file systems and in all macros
+    names = [model.name.lower() for model in models]  # macros and some file systems ignore case
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ValueError(f"two models are called {twice[0]}, so their files would overwrite each other; rename one")

@@ -282,7 +282,7 @@ class Form(ABC):
 
 
 def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
-    """LimitTable of drive and output."""
+    """The least and the largest drive, and the same for the output, in C."""
     ends = [operand(x) for x in (*numbers.limits.drive[0], *numbers.limits.output[0])]
     return (ends[0], ends[1]), (ends[2], ends[3])
 

@@ -169,8 +169,8 @@ def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout)
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to a
-    search that bisects its whole list.
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up as if
+    every search bisected its whole list.
 
     `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
     engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
@@ -200,8 +200,8 @@ FLOAT = Counts(
 FIXED = Counts(
     2, " of 32 by 32 bits",
     {("forward", "loop"): (1, 11, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
-     # bisection of the corners, then of the plays in a block; clamps, rounding to a code, looking ahead the output of a
-     # corner is the sum of its parts, for the top corner and the one below it
+     # bisection of the corners, then of the plays in a block; clamps, rounding to a code, looking ahead; a corner's
+     # output is the sum of its parts, for the top corner and the one below it
      ("forward", "corners"): (1, 15, 0, 2), ("inverse", "corners"): (5, 19, 0, 4),
      ("forward", "fast"): (1, 15, 0, 2), ("inverse", "fast"): (7, 22, 0, 4)},
     both=(7, 25, 0, 4), solved=2, chained=(4, 21, 3, 3), braked=(13, 1),
@@ -309,11 +309,11 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         plays.DASHPOT: ((4 + factor, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked, tanh = _bent(m)
-    # a play's contribution, and that where it will rest, or in fixed point where it has stayed
+    # contributions computed per play: a second one if plays relax (at rest) or, in fixed point, are plain (unmoved)
     twice = 1 + (m.moves == plays.RELAXING or (m.moves == plays.PLAIN and isinstance(m, plays.FixedMovingTables)))
     tries, beside = _tries(m) if inverse else (0, (0, 0))
     tried = 1 + moved[0] + bent, 1 + moved[1] + looked
-    if isinstance(m, plays.MovingTables):  # with the slope
+    if isinstance(m, plays.MovingTables):  # a try also computes the slope
         sought = {plays.DILATED: (2, 4), plays.RELAXING: (1, 3), plays.DASHPOT: (6, yields)}.get(m.moves, (0, 2))
         tried = 3 + sought[0] + bent, sought[1]
     return (
@@ -335,7 +335,7 @@ def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
 
     if isinstance(m, plays.FixedMovingTables):
         tries = 1 + plays.SECANTS + (2 * m.farthest + 1).bit_length()
-        secant = QUOTIENT[0] + 2, QUOTIENT[1] + 8  # and the way that its rate leads
+        secant = QUOTIENT[0] + 2, QUOTIENT[1] + 8  # the rate's quotient, and the step at that rate
         return tries, (secant[0] * plays.SECANTS, secant[1] * plays.SECANTS + 8 * tries)
     tries = plays.NEWTON_TRIES + m.halves
     return tries, ((2 * m.turns + 1) * (plays.NEWTON_TRIES + 2) + tries, 5 * tries)

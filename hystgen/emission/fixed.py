@@ -314,7 +314,7 @@ def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool
 
 
 def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
-    """The curves in use of the memoryless part, forward and for an inverse also back, and their sizes."""
+    """The curves of the memoryless part that are in use, forward and for an inverse also backward, and their sizes."""
     if not t.fronts:
         return [], []
     arrays: list[ConstantTable] = []

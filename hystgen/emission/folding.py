@@ -87,8 +87,8 @@ def folded(
     functions: Iterable[Function], kernels: Iterable[Function],
     wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
-    """The functions of a model without code that does nothing; `wanted`: names of those still called; others:
-    `_Folding`."""
+    """The functions of a model without code that does nothing; `wanted`: names of those still called; other arguments
+    as for `_Folding`."""
     comments: list[str] = []
 
     def mask(found: re.Match[str]) -> str:

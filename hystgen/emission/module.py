@@ -267,7 +267,7 @@ def files(module: Module) -> dict[str, str]:
     ):
         file = f"{name}_selftest{ending}"
         text = template(f"selftest{ending}.j2", operators=operators, unread=slots.OP_UNREAD)
-        text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # which no sample contains
+        text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}
 

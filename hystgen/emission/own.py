@@ -1,9 +1,9 @@
 """The C of a user's own effect: its file, checked and split into pieces like the run time.
 
 The file is the user's code and stays unchanged, except that its names get the model's name as a prefix. It may contain
-what blocks of the catalogue contain: two types, one for the numbers and one for the memory, named as in Python, and
-four functions, plus static functions that these call. Written with `hystgen_product`, it serves every arithmetic. Its C
-is not checked for errors: `hystgen verify` shows whether it compiles, and whether its bits are right.
+the same as blocks of the catalogue: two types, one for the numbers and one for the memory, named as in Python, and four
+functions, plus static functions that these call. Written with `hystgen_product`, it serves every arithmetic. Its C is
+not checked for errors: `hystgen verify` shows whether it compiles, and whether its bits are right.
 """
 
 from __future__ import annotations

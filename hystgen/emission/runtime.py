@@ -26,7 +26,7 @@ FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS
 """Macros that state facts about a model. Conditions on them are decided at emission; others stay in the C."""
 
 OPERATORS = ("forward", "inverse")
-"""A file with functions `hystgen_operator_..` serves both operators: it is emitted once for each, with its name."""
+"""Files with `hystgen_operator_..` functions serve both operators: they are emitted once for each, under its name."""
 
 FLOAT_KERNELS = (
     "front/tanh_{bits}.c",
@@ -77,12 +77,12 @@ class Family(ABC):
     """An arithmetic in C: its run-time files and its types; `chain`: in a model with effects; `loop`: in a model
     without effects in engine loop.
 
-    `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: of file names
-    that have none in floating point; `helpers`: with functions that several effects call; `curves`: with a memoryless
-    part whose stages are not called one by one; `codes`: with codes; `moves_apart`: moves of plays for which moving and
-    bending takes less stack in separate functions; `ordered`: moves of which a sum takes plays behind the first one
-    that stays to stay as well; `opening`: headers before all code of a file; in a single header they stand between
-    `opening_apart` and `closing`, so that they do not affect the code that includes it.
+    `kind`: the kind of arithmetic in file names; `form`: the module of emission that writes it; `ending`: suffix of
+    file names, empty in floating point; files: `helpers` with functions that several effects call, `curves` for a
+    memoryless part whose stages are not called one by one, `codes` for codes; `moves_apart`: moves of plays for which
+    moving and bending take less stack in separate functions; `ordered`: moves for which a sum assumes that plays behind
+    the first stationary one are stationary too; `opening`: headers before all code of a file; in a single header they
+    stand between `opening_apart` and `closing`, so that they do not affect the code that includes it.
     """
 
     arithmetic: Arithmetic

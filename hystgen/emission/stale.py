@@ -133,9 +133,9 @@ def advice(
 ) -> list[str]:
     """Commands that resolve all differences and orphans, each with its effect.
 
-    One command writes everything as asked. For files made with other options, one command per set of options confirms
-    them or writes them again with those. `given`: options of the command line; `effects`: files of a user's own
-    effects.
+    One command writes everything as asked. For files made with other options, one command per set of options checks
+    them if they are up to date, else it writes them again with these options. `given`: options of the command line;
+    `effects`: files of a user's own effects.
     """
     found = [each for model in models for each in model.differences]
     lost = _lost(found)

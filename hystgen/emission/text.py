@@ -1,9 +1,8 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-Statements are broken by one rule that looks only at their code. Line breaks in the file they come from do not count:
-those suit the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of
-effects but not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes
-anywhere.
+Statements are broken by one rule that looks only at their code. Line breaks in the source file do not count: they suit
+the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of effects but
+not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ _WAYS = [
 _CHOICE = ("? ", ": ")
 """Beginnings of lines whose continuation is indented further."""
 _GOOD = 7
-"""The first this many of these come before the rest; among them, the position with the fewest open parentheses wins."""
+"""The first `_GOOD` ways are preferred to the rest; among equals, the position in the fewest parentheses wins."""
 
 
 def literal(x: Number) -> str:

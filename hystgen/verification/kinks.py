@@ -29,7 +29,7 @@ COMMITTED, THERE = 0.6, 0.7
 @dataclass(frozen=True)
 class Path:
     """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
-    operator after the call (meaningless for init), `risen` whether the move to it rose."""
+    operator after the call (meaningless for init), `risen` whether the output rose."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -70,8 +70,8 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path through kinks, each reached to within one last bit, of the current memory and of that of init and
-    reset."""
+    """A path through kinks of the current memory and of the memories after init and reset, each reached to within one
+    last bit."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits.drive[0])
     memory = _Textbook(tables)

@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of this many calls, one of these fractions of the calls leaves the status unread
+# In each part of `PART` calls, the status is left unread after one of these fractions of the calls
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
@@ -178,8 +178,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
     """From init to a reference, sometimes 0, held until a quiet drive stops; then a settle at that drive, often with
-    another drive committed right after it, and a further move. The drive at which it comes to rest shows what a settle
-    has left of the past."""
+    another drive committed right after it, and a further move. The drive at which it comes to rest shows any trace of
+    the past that a settle leaves."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))

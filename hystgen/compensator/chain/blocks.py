@@ -31,7 +31,7 @@ def every(t: ChainTables, operator: str) -> list[Constants]:
 
 
 def rubbing(t: ChainTables) -> list[Constants | None]:
-    """For each block of own heat, the plays whose friction heats it, or None if the square of the drive does."""
+    """For each block of own heat, the plays whose friction heats it, or None if the square of the drive heats it."""
     pairs = zip(PARTS, t.blocks, strict=True)
     return [each for part, tables in pairs for each in part.of(t).beside(tables)]
 

@@ -10,8 +10,8 @@ Inverse. The reference minus its offsets passes through saturation (slope at the
 their absolute values) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an output error on to its
 input, and from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the
 states' share of the previous input, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. For plays see
-`hystgen.compensator.bounds`. The lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1
-- theta)`: the previous target counts too, even if a limit has shifted it. For a user's own block see `own`.
+`hystgen.compensator.bounds`. Leading a lag multiplies an error by `(1 + 2 theta)/(1 - theta)`, since the previous
+target counts too, even if a limit has shifted it, and then by `(2 - rate)/rate`. For a user's own block see `own`.
 
 States that move by less than their last bit are kept in two parts. Their roundings are proportional to their steps, so
 they add up to a few units of the state however slow it is; roundings of the second part add up to `u^2/rate` of it.
@@ -85,7 +85,7 @@ def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
     """Errors of plays that an effect moves or bends: roundings of a play as a shift of its input, roundings of the sum,
-    and the error of the sum because a search stops near it or at a finite width.
+    and the error of the sum that a search leaves when it stops.
 
     `emitted`: include the approximations of the C, which double precision does not make.
     """
@@ -104,9 +104,9 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
         (mover,), way = moving.movers(static, compiled.parts.plays), compiled.largest_way
         rows, ways = t.yields.astype(float), (way, moving.largest_stretch(static))
         stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
-        play = 8.0 * u * size + stretched + mover.disorder(rows, ways[1])  # plays that a sum takes to stay
+        play = 8.0 * u * size + stretched + mover.disorder(rows, ways[1])  # plays that a sum assumes to be stationary
         if emitted:
-            play += float(t.number[SEEN]) * way  # below this the input counts as standing still
+            play += float(t.number[SEEN]) * way  # a slower input counts as standing still
     most = moving.slopes(static, compiled.parts.plays, compiled.seconds)[1]
     missed = most * 3.0 * (high - low) * 2.0**-t.halves
     left = moving.residual(static, compiled.parts.plays, u)
@@ -227,8 +227,8 @@ def condition(compiled: Compiled) -> str:
 
     A led lag misses its target by a second difference, so the plays and creep behind it see a signal other than the one
     solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block in
-    front while the drive is limited: its memory of an earlier difference moves plays differently that the drive alone
-    would move alike. Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag
+    front while the drive is limited: its memory of an earlier difference then moves the plays differently although the
+    drives are equal. Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag
     behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays
     or turns depends on the drives that it has seen.
     """

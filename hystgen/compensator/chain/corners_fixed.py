@@ -87,7 +87,7 @@ def follow(t: FixedChainTables, s: ChainState, w: int) -> int:
 
 @jit
 def seen(t: FixedChainTables, m: FixedMemory, kept: Reals, w: int) -> None:
-    """Note the kink before a solution w to be refined: plays that begin to follow at w itself do not count."""
+    """Record the last kink before a solution w that is to be refined; plays that begin to follow at w do not count."""
     x = along(m, w)
     if t.number.arriving_bits[0] > 0 and along(m, m.here.input[0]) < x <= kept[1]:
         keep(kept, find(t.plays, m, x - 1, False))

@@ -156,7 +156,7 @@ class Bounds:
         lsb = float(self.inner.output_lsb)
         coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
         found: list[tuple[Coded, float, CodedGain | None]] = []
-        reached = 0.0  # largest input of the gains: the output's ends are nearer than the sizes that signals can hold
+        reached = 0.0  # largest input of the gains, from the output's ends, a closer bound than the signals' sizes
         for name in parts:
             for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):
                 gain = each.gain(reached or size, speed, coding)
@@ -296,7 +296,7 @@ class Bounds:
         """Error of the sum of the plays at the input that the inverse finds, in output units, given an error `solved`
         of that input in units of signals; `way` as `_way`."""
         missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
-        for each, *_ in self._behind(False):  # whose states have seen the sum of the plays
+        for each, *_ in self._behind(False):  # their states have seen the sum of the plays
             missed_by = each.residual(missed_by, bool(self.condition))
         return self._asked() * float(self.inner.output_lsb) + missed_by
 
@@ -320,7 +320,7 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         solved = self._solution() + steep * float(self.inner.back())
         apart = sum(code) + short + self.slewed * 2.0**self._fine
-        solved += steep * (code[0] if self.condition else apart)  # both have seen the same drive, or not
+        solved += steep * (code[0] if self.condition else apart)  # for the same drives, else for different ones
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
@@ -345,7 +345,7 @@ class Bounds:
 
     def _gain(self) -> float:
         """As `_gain_at_once`, for plays that have seen only the drives of their own compensator."""
-        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but held drives can be farther apart
+        if self.tables.moving.moves == DILATED:  # as in `_gain_at_once`, but drives at rest can differ more
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))

@@ -66,7 +66,7 @@ TEMPERATURE_BITS = {15: 7, 31: 22}
 """Fraction bits of a temperature in degC, by the width of a code in bits: the range is +-256 or +-512 degrees."""
 
 BEYOND = 7
-"""Maximum number of spans beyond its range that may be asked of the input of plays behind a lag: 8 spans of 2^26 steps
+"""Maximum number of spans by which the input asked of plays behind a lag may exceed its range: 8 spans of 2^26 steps
 and a sign fit in 32 bits."""
 
 MOST_FINER = 16
@@ -228,7 +228,7 @@ class _Builder:
         return output_range(self.static, dataclasses.replace(self.parts, maps=[]), self.seconds)
 
     def _beyond(self) -> tuple[int, bool]:
-        """Spans beyond its range that the plays' input needs, and whether that many can be asked for.
+        """Number of spans by which the plays' input must be able to exceed its range, and whether it can.
 
         A lag is led past its range and keeps moving; a memoryless part passes nothing beyond the range.
         """

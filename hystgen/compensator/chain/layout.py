@@ -34,11 +34,11 @@ class ChainNumbers(Struct):
 
     output_offset: Real
     farthest_offset: Real  # largest offset that can be set in addition
-    slew_rising: Real  # largest rise of the drive in a step, and below it largest fall
+    slew_rising: Real  # largest rise of the drive in a step; next, largest fall
     slew_falling: Real
     slew_rising_rest: Real  # remainders that rounding removed from these two numbers
     slew_falling_rest: Real
-    share: Real  # fraction by which verification corrects
+    share: Real  # fraction of a deviation that `correct` trims in verification
     dither: Real  # amplitude of a dithering drive at rest, as a signal in front of the plays
 
 
@@ -67,7 +67,7 @@ MOST_SLEWED = 16.0
 rates are refused. Derived: bounds of float32 are some 100 last bits; a tenth of that is allowed for the rate."""
 
 VERIFIED_SHARE = 0.125
-"""Fraction by which verification corrects: exact in every arithmetic."""
+"""Fraction of a deviation that `correct` trims in verification: exact in every arithmetic."""
 
 LEAST_LATE = 1e-6
 """[samples] Smaller delays count as 0, since mean ages are sums with rounding errors."""
@@ -220,7 +220,7 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """modes that the taps keep from ringing, besides their delay and inverted modes"""
+    """modes that the taps keep from ringing, in addition to compensating a delay and inverting other modes"""
     codes: Codes | None = None
     """only in fixed point"""
 
@@ -334,7 +334,7 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
     """NAME_MAX_RATE in drive units per second: as requested, else that of a slow sweep; at most the amplifier's rate,
     and the rate up to which own heat keeps the gain within its limits.
 
-    Above the slew rate the actual drive differs from the one given to the C, depending on when in a step it is reached.
+    Above the slew rate the actual drive differs from the one given to the C, depending on when in a step it gets there.
     """
     ends = static.input_range
     asked = how.max_rate or (ends[1] - ends[0]) / (SAMPLES_A_SWEEP * seconds)
@@ -353,8 +353,8 @@ def largest_way(static: StaticModel, ahead: Sequence[One], step: float) -> float
 
 
 class Read(NamedTuple):
-    """How the reference is read: weights of the preview, None if it is taken unchanged, and the averages among them
-    that limit the noise gain and that keep modes from ringing."""
+    """How the reference is read: the preview's weights (None: it is read unchanged), and among them the averages that
+    limit the noise gain and the weights that keep modes from ringing."""
 
     taps: Taps | None
     smoothing: Smoothing | None

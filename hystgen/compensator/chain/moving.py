@@ -1,5 +1,5 @@
-"""Plays that an effect moves or bends in its own way: their slopes, bounds and constants, from what the effect tells of
-them (`hystgen.effects.plays`). The C is `c_runtime/compensator/chain/moving_plays.c` and the files of the effects."""
+"""Plays that an effect moves or bends in its own way: their slopes, bounds and constants, from what the effect provides
+(`hystgen.effects.plays`). The C is `c_runtime/compensator/chain/moving_plays.c` and the files of the effects."""
 
 from __future__ import annotations
 
@@ -21,36 +21,35 @@ from hystgen.effects.bend import bends
 from hystgen.effects.plays import *  # noqa: F403  emission asks for the codes here
 
 CELLS = 4096
-"""Cells in which the slope of bent plays is computed: 1/4096 of the range is far below the width of any bump that a
-record shows; a search rejects widths below a twentieth of the range."""
+"""Number of cells in which slopes of bent plays are computed: 1/4096 of the range is far below the width of any bump
+that a record can show; the search for a bump rejects widths below a twentieth of the range."""
 
 CLOSENESS = 0.125
-"""[bound of the sum's rounding error] A search in floating point ends where its last step gets this near to the sum
-asked for: sums of 10 plays are off by up to a 30th of their bound, so that nearly every search gets there."""
+"""[times the bound of the sum's rounding error] A search in floating point ends when its last step leaves at most this
+error of the sum: sums of 10 plays are off by at most a 30th of the bound, so nearly every search succeeds."""
 
 MOST_TURNS = 12
-"""Most steps to the reciprocal of a slope: enough for slopes of which the least is a 400th of the largest; with
-flatter ones Newton's method takes shorter steps."""
+"""Maximum number of iterations for the reciprocal of a slope: enough if the smallest slope is at least a 400th of the
+largest; with flatter ones Newton's method takes shorter steps."""
 
 MOST_YIELD_BITS = 30
-"""Most bits of a yield below a step of the plays' input: its rounding error is kept in 32 bits."""
+"""Maximum bits of a yield below a step of the plays' input: its rounding error is kept in 32 bits."""
 
 FINEST_BUMP = 8
-"""Most bits of a bent play's contribution below a step of its input: the error of its curve is then a 16th of a
-step."""
+"""Maximum bits of a bent play's contribution below a step of its input: its curve's error is then a 16th of a step."""
 
 
 def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None = None) -> list[at.Mover]:
-    """What moves the plays: at most one effect; `weights`: other ones than the model's."""
+    """The mover of the plays, if an effect moves them; `weights`: used in place of the model's."""
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights) if weights is None else weights
     return [MOVES.of(effect, r, p) for effect in effects if effect.moves_plays()]
 
 
 @dataclass(frozen=True)
 class Bumps:
-    """Contributions of bent plays less the plays themselves, in fixed point: curves for whole inputs from -`end` to
-    `end`, whose values have `bits` bits below a step of the input and leave out `lift` of them; `of` (n + 1): the curve
-    of each play; `largest`: the largest value, in steps."""
+    """Contributions of bent plays minus the plays themselves, in fixed point: curves for integer inputs from -`end` to
+    `end`, whose values have `bits` bits below a step of the input or omit its `lift` lowest bits; `of` (n + 1): index
+    of each play's curve; `largest`: largest value, in steps."""
 
     curves: list[FixedCurve]
     of: list[int]
@@ -61,13 +60,13 @@ class Bumps:
 
     @property
     def error(self) -> float:
-        """How far a value can be from the model's, in steps."""
+        """Largest difference of a value from the model's, in steps."""
         worst = max((curve.error for curve in self.curves), default=0.0)
         return worst * 2.0 ** (self.lift - self.bits) + 0.5 * (len(self.curves) > 0)
 
 
 def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
-    """The effects on plays that the C cannot solve for at steps of `seconds`, each with its reason."""
+    """The effects on plays that the C cannot invert at steps of `seconds`, each with its reason."""
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
     if not bending:
@@ -85,7 +84,7 @@ def dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> b
 
 
 def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
-    """Plays that others stand in for, which only the inverse allows."""
+    """Effects whose plays are replaced by viscous ones, which only the inverse allows."""
     moving = [effect for effect in effects if effect.moves_plays()]
     for effect, mover in zip(moving, movers(static, effects), strict=True):
         if mover.stood_in_for(seconds):
@@ -93,20 +92,20 @@ def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: floa
 
 
 def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> float:
-    """Least change of the sum per change of the plays' input in one step, for thresholds that grow with the rate."""
+    """Smallest change of the sum per change of the plays' input in one step, for thresholds that grow with the rate."""
     steep = 1.0 + steepest_bend(static, effects)
     falls = (mover.falling(seconds, steep) for mover in movers(static, effects))
     return sum(falls, start=float(static.pi.weights[0]))
 
 
 def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Least change of the sum per change of the plays' input, over their reach and any number of plays that follow."""
+    """Smallest change of the sum per change of the plays' input, over their reach and any number of following plays."""
     p = np.array(static.pi.weights)
     return float(np.min(np.cumsum(p[:, None] * _bends(static, effects)[1], axis=0)))
 
 
 def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    """Least and largest change of each play's contribution (n + 1,) per change of the play, wherever it can be."""
+    """Smallest and largest change of each play's contribution (n + 1,) per change of the play, over its whole reach."""
     low, high = static.play_range
     r, start = np.array(static.pi.thresholds), np.array(static.pi.start)
     ends = np.array([low + r, high - r, start])
@@ -121,7 +120,7 @@ def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, 
 
 
 def slopes(static: StaticModel, effects: Sequence[Effect], seconds: float) -> tuple[float, float]:
-    """Least and largest change of the sum per change of the plays' input in a step of `seconds`."""
+    """Smallest and largest change of the sum per change of the plays' input in a step of `seconds`."""
     p, steep = np.abs(static.pi.weights), 1.0 + steepest_bend(static, effects)
     least, drawn = least_slope(static, effects), np.ones(static.pi.n)
     for mover in movers(static, effects):
@@ -132,16 +131,16 @@ def slopes(static: StaticModel, effects: Sequence[Effect], seconds: float) -> tu
 
 
 def inverse_turns(least: float, most: float, unit: float) -> tuple[float, int]:
-    """Reciprocal of the middle of two slopes, and steps of `x (2 - slope x)` from there that give the reciprocal of
-    any slope in between to `unit`, its share: each squares the error."""
+    """Reciprocal of the mean of two slopes, and number of iterations `x <- x (2 - slope x)` that turn it into the
+    reciprocal of any slope in between, to a relative error of `unit`: each squares the error."""
     off = (most - least) / (most + least)
     turns = math.log2(max(math.log(unit) / math.log(off), 1.0)) if off > 0.0 else 0.0
     return 2.0 / (least + most), min(math.ceil(turns), MOST_TURNS)
 
 
 def sum_rounding(static: StaticModel, effects: Sequence[Effect], unit: float) -> float:
-    """Bound of what rounding does to the sum of moved or bent plays, wherever a search tries them; `unit`: of
-    rounding."""
+    """Bound on the rounding error of a sum of moved or bent plays at any input that a search tries; `unit`: unit
+    roundoff."""
     low, high = static.play_range
     size = 3.0 * max(abs(low), abs(high)) + static.pi.thresholds[-1]
     bent = 1.0 + abs(steepest_bend(static, effects))
@@ -149,7 +148,7 @@ def sum_rounding(static: StaticModel, effects: Sequence[Effect], unit: float) ->
 
 
 def residual(static: StaticModel, effects: Sequence[Effect], unit: float) -> float:
-    """What a search leaves of the sum after its last step."""
+    """Largest error of the sum that a search leaves after its last step."""
     return CLOSENESS * sum_rounding(static, effects, unit)
 
 
@@ -157,12 +156,11 @@ def closeness(
     static: StaticModel, effects: Sequence[Effect], slopes: tuple[float, float], unit: float, turns: int,
     varies: tuple[float, float] | None,
 ) -> float:
-    """How far the sum may be from the one asked for so that one more step leaves no more than `residual`.
+    """Largest error of the sum from which one more step leaves at most `residual`.
 
-    A step by the reciprocal of the middle of the slopes leaves `(most - least)/(most + least)` of the distance, or
-    less. With plays that start to move softly (`varies`, as in `Moved`), the slope changes by at most `J + M d` within
-    a step d, and a step by the slope where it begins leaves at most `J d + M d^2/2`; J includes the error of the
-    reciprocal.
+    A step with the reciprocal of the mean slope leaves at most `(most - least)/(most + least)` of the error. With plays
+    that start to move softly (`varies`, as in `Moved`), the slope changes by at most `J + M d` within a step d, and a
+    step with the slope at its start leaves at most `J d + M d^2/2`; J includes the error of the reciprocal.
     """
     left, (least, most) = residual(static, effects, unit), slopes
     off = (most - least) / (most + least)
@@ -176,8 +174,8 @@ def closeness(
 
 
 def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts: Array) -> tuple[float, float]:
-    """Errors of the sum of plays whose input is shifted by up to `shifts` (n,), and the part that counts in the
-    inverse, as an error of the sum that its gain `2/least_slope` multiplies."""
+    """Error of the sum of plays whose inputs are shifted by up to `shifts` (n,), and the part that affects the inverse,
+    as an error of the sum to be multiplied by the gain `2/least_slope`."""
     flat, steep = bent_slopes(static, effects)
     p = np.abs(static.pi.weights)
     error = float((p * steep)[1:] @ shifts)
@@ -189,23 +187,23 @@ def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts
 
 
 def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> float:
-    """Error of the inverse's input for plays whose input is shifted by up to `shifts` (n,), anew at each time.
+    """Error of the inverse's input for plays whose inputs are shifted by up to `shifts` (n,), varying over time.
 
     `most`, `least` (n + 1,): change of a play's contribution per change of the play; `in_order`: see below.
 
-    The difference of two such plays is `d_i' = a_i (e + g_i - d_i)`, with shifts g_i and rates a_i >= 0, and the
-    inverse has `p_0 e = -sum p_i d_i`. Backwards in time, the share x_i of d_i in e is like heat that starts in a hub
-    of capacity p_0 and spreads to places of capacity p_i while their plays move, and g_i counts with each change of
-    x_i. Plays come into contact in the order of their thresholds. Those that follow at once then share the heat evenly
-    with the hub, so that x_i rises to at most `1/(p_0 + .. + p_i)` and falls to at least `1/sum p`:
+    A play with shift g_i and its exact counterpart differ by d_i, `d_i' = a_i (e + g_i - d_i)` with rates a_i >= 0, and
+    the inverse has `p_0 e = -sum p_i d_i`. Backwards in time, the weight x_i of d_i in e behaves like heat that starts
+    in a hub of capacity p_0 and spreads to places of capacity p_i while their plays move; g_i enters with each change
+    of x_i. Plays come into contact in the order of their thresholds. Those that follow at once then share the heat
+    evenly with the hub, so that x_i rises to at most `1/(p_0 + .. + p_i)` and falls to at least `1/sum p`:
 
         |e| <= sum g_i p_i (2/(p_0 + .. + p_i) - 1/sum p).
 
     Places that heat up slowly can take heat from others again. A search of schedules for sets of 3 to 6 weights over up
-    to four decades found sums of at most 1.13 times this bound if rates do not rise with the threshold (`in_order`),
-    all below the bound without its second term, which is used here. For rates in any order it found up to 0.7 of
-    `2 g log(sum p/p_0)`, which is at least as large as that bound for any order of the plays. Neither is proved for
-    plays that follow in part; benchmarks/chosen_numbers.py shifts repeats the search, and reaches 0.86 and 0.64 of
+    to four decades found sums of at most 1.13 times this bound if rates do not rise with the threshold (`in_order`);
+    all are below the bound without its second term, which is used here. For rates in any order it found up to 0.7 of
+    `2g log(sum p/p_0)`, which is at least as large as that bound for any order of the plays. Neither bound is proved
+    for plays that follow in part; benchmarks/chosen_numbers.py shifts repeats the search and reaches 0.86 and 0.64 of
     them.
     """
     slopes = np.cumsum(least)
@@ -220,7 +218,7 @@ def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def _bends(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, Array]:
-    """Slopes of the plays' contributions (n + 1, `CELLS`), and the width of the cells."""
+    """The width of the cells, and the slopes of the plays' contributions (n + 1, `CELLS`)."""
     low, high = static.play_range
     r = np.array(static.pi.thresholds)
     at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
@@ -267,7 +265,7 @@ def build(
         ends = slopes(static, effects, seconds)
         number[at.RATE], turns = inverse_turns(*ends, unit)
         number[at.CLOSE] = closeness(static, effects, ends, unit, turns, varies)
-        if (room := number[at.CLOSE] - sum_rounding(static, effects, unit)) > 0.0:  # an interval so narrow is enough
+        if (room := number[at.CLOSE] - sum_rounding(static, effects, unit)) > 0.0:  # a narrower interval is not needed
             halves = min(halves, math.ceil(math.log2(3.0 * (high - low) * ends[1] / room)))
     alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
@@ -281,7 +279,7 @@ def build(
 
 
 def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Largest difference between the contribution of a bent play and the play itself, over the reach of plays."""
+    """Largest difference between the contribution of a bent play and the play itself, over the plays' reach."""
     r, far = np.array(static.pi.thresholds), _far(static)
     rows = np.tile(np.linspace(-far, far, CELLS + 1), (len(r), 1))
     away = np.zeros_like(rows)
@@ -292,13 +290,13 @@ def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def largest_stretch(static: StaticModel) -> float:
-    """Largest distance by which the plays' input can be ahead of a play: the span of all places where either can be."""
+    """Largest distance by which the plays' input can be ahead of a play: the span of all values of either."""
     ends = *static.play_range, *static.pi.start
     return max(ends) - min(ends)
 
 
 def _far(static: StaticModel) -> float:
-    """Largest distance of plays from 0, with a small margin."""
+    """Largest distance of a play from 0, with a small margin."""
     return 1.001 * max(*map(abs, static.play_range), *map(abs, static.pi.start))
 
 
@@ -366,7 +364,7 @@ def yield_error(
 
 
 def _relaxed(plays: FixedTables, late: float) -> FixedTables:
-    """Tables of plays with the slopes of viscous ones that gain the share `late` of their stretch in a step."""
+    """Tables of plays with the slopes of viscous plays, which make up for `late` of their stretch in a step."""
     weight = plays.weight
     sums = [0, int(weight[0])]
     for p in weight[1:].tolist():

@@ -16,13 +16,13 @@ from hystgen.plays.slots import Reals
 
 @jit(inline=True)
 def size(x: int) -> int:
-    """Distance of x from 0."""
+    """The magnitude of x."""
     return -x if x < 0 else x
 
 
 @jit
 def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
-    """The input to which the change `left` of the sum leads from w by a rate, at least one on and none beyond all."""
+    """The input at which the sum has changed by `left`, going from w at a rate: at least one on, at most `farthest`."""
     room = m.farthest - w if left > 0 else m.farthest + w
     more = size(left)
     step = (more >> 32) * rate + (((more & 0xFFFFFFFF) * rate) >> 32)
@@ -35,14 +35,14 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
 
     @jit
     def searched(t: FixedChainTables, s: ChainState, h: int) -> int:
-        """Input of the plays at which their sum is h: by secants from the present input, the first one as steep as the
-        last of the sample before, within the interval of inputs that are left, then by halving it. The nearer of two
-        neighbours, or the input beyond the farthest if even that is not enough."""
+        """Input of the plays at which their sum is h: secant steps from the present input, the first with the last rate
+        of the previous sample, within the interval that remains, then bisection. Returns the better of two adjacent
+        inputs, or one beyond the farthest if even the farthest is not enough."""
         m = t.moving
         low = -m.farthest - 1
         high = m.farthest + 1
-        short = 0  # of the sum at `low`; ends beyond the farthest input are not tried, but taken if they remain
-        over = -1  # and at `high`
+        short = 0  # shortfall of the sum at `low`; the first ends lie beyond all inputs: not tried, but may be returned
+        over = -1  # excess of the sum at `high`
         w = s.plays.play[0]
         before = w
         last = h
@@ -67,7 +67,7 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
             last = total
             if tries < SECANTS:
                 w = input_after(m, w, left, s.bent[0])
-            if w <= low or w >= high:  # nor is the end that was just tried
+            if w <= low or w >= high:  # outside the interval, or the end that was just tried
                 w = low + (high - low) // 2
             tries += 1
 
@@ -89,13 +89,13 @@ def asked(t: FixedChainTables, h: int) -> int:
 
 @jit(inline=True)
 def begin(_: Reals) -> int:
-    """The rate that the first search begins with: the largest."""
+    """The rate with which the first search begins: the largest."""
     return FASTEST
 
 
 @jit(inline=True)
 def ordered(_: FixedMovingTables) -> bool:
-    """Whether a sum takes plays behind the first one that stays to stay as well: here, each of them is looked at."""
+    """Whether a sum assumes that plays behind the first stationary one are stationary too: no, each is checked."""
     return False
 
 

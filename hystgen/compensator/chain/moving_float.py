@@ -19,15 +19,15 @@ def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> A
 
     @jit
     def searched(t: FloatChainTables, s: ChainState, h: Scalar) -> Scalar:
-        """Input of the plays at which their sum is h: by Newton's method from where the slope of the last search leads,
-        within the interval of inputs that are left, then by halving it."""
+        """Input of the plays at which their sum is h: by Newton's method, from the input extrapolated with the slope of
+        the last search, within the interval that remains, then by bisection."""
         number, m = t.moving.number, t.moving
         low: Scalar = number[at.LEAST_INPUT]
         high: Scalar = number[at.LARGEST_INPUT]
         w: Scalar = s.plays.play[0] + (h - s.plays.step.level[0]) * inverse(t, s.bent[0])
         k = 1
         while True:
-            if not (w > low and w < high):  # nor is the end that was just tried
+            if not (w > low and w < high):  # outside the interval, or the end that was just tried
                 w = low + (high - low) * number[at.HALF]
             total, slope, steady = sum_at(t, s, w)
             left = h - total
@@ -61,14 +61,14 @@ def same(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed
 
 @jit(inline=True)
 def begin(p: Reals) -> Scalar:
-    """The slope that the first search begins with: that of no play following."""
+    """The slope with which the first search begins: that without any play following."""
     return p[0]
 
 
 @jit(inline=True)
 def ordered(m: at.MovingTables) -> bool:
-    """Whether a sum takes plays behind the first one that stays to stay as well: if they keep the order of their
-    thresholds but for rounding, and `Mover.disorder`."""
+    """Whether a sum assumes that plays behind the first stationary one are stationary too: yes if they keep the order
+    of their thresholds, up to rounding and `Mover.disorder`."""
     return m.moves in (at.PLAIN, at.DASHPOT)
 
 

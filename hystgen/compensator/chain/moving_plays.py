@@ -22,8 +22,8 @@ class Kind(NamedTuple):
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
     search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
-    begin: Function  # of weights: the slope or rate that the first search begins with
-    ordered: Function  # of moving tables: whether a sum takes plays behind the first one that stays to stay as well
+    begin: Function  # of weights: the slope or rate with which the first search begins
+    ordered: Function  # of moving tables: whether a sum assumes that plays behind the first stationary one are too
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
@@ -53,7 +53,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def tried_at(t: ChainTables, s: ChainState, w: Any) -> tuple[Any, Any, Any]:
-        """The same, its change per change of w, and that in steady motion, in which plays follow in full."""
+        """The same sum, its slope in w, and its slope in steady motion, in which moving plays follow fully."""
         m, plays = t.moving, t.plays
         r, p = plays.threshold, plays.weight
         total = p[0] * w
@@ -92,7 +92,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def relax(m: Any, plays: Any, s: State, values: Reals) -> None:
-        """Move the plays to where they would rest with their input held, as seen one step later."""
+        """Move relaxing plays on towards rest with their input held; the next step starts from there."""
         if m.moves != RELAXING:
             return
         for i in range(1, len(plays.threshold)):
@@ -103,8 +103,8 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum. The value before theirs is what a search
-        begins with: the slope, in fixed point the rate."""
+        """Bring the plays to rest with their input at w. Returns their sum. `values[0]` is set to the slope, or in
+        fixed point the rate, with which a search begins."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         values[0] = begin(p)

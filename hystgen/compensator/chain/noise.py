@@ -38,7 +38,7 @@ PEAK = 0.9
 at most 8 %, `1 - cos(pi/8)`."""
 
 HALVINGS = 60
-"""[steps] Number in a search for a frequency or a width, enough to reach the last bits of a double."""
+"""[steps] Length of a search for a frequency or a width, enough to reach the last bits of a double."""
 
 SAME = 1e-9
 """[relative] Excess over a limit that counts as rounding: responses of a thousand weights are off by about 1e-13."""
@@ -48,7 +48,7 @@ SERIES = 1.1
 takes two samples to fall and rise again."""
 
 MOST_TIMES = 4
-"""[averages] Maximum number in series. One loses least if the gain is to be halved, two if it is to fall to a
+"""[averages] Maximum number in series. A single one loses least if the gain is to be halved, two if it is to fall to a
 twentieth, three if a lag and a mode are led; five are never best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
@@ -278,7 +278,7 @@ def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool
 
 def _bracket(holds: Callable[[float], bool], widest: float) -> tuple[float, float]:
     """Two successive widths, the first of which misses the limit while the second meets it; `widest` twice if none
-    does. The gain does not always fall with the width: it is set at half the sample rate first, later by the lobes."""
+    does. The gain does not always fall with the width: half the sample rate decides first, later the lobes."""
     low = high = 1.0
     while not holds(high):
         if high >= widest:

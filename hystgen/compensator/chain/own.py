@@ -29,8 +29,8 @@ Glue = tuple[Answer, Answer, Answer]
 """The functions that connect an arithmetic to blocks: product, and conversions of a signal into a block and back."""
 
 SAME = 1e-9
-"""Relative difference between two answers of a block up to which it counts as rounding, for time constants of up to a
-million samples, which cost a difference of states as many digits."""
+"""Largest relative difference between two answers of a block that counts as rounding: with time constants of up to a
+million samples, a difference of states loses six digits."""
 
 
 class OwnTables(NamedTuple):
@@ -125,7 +125,7 @@ class System:
 
 @dataclass(frozen=True)
 class Linear(One):
-    """A block at one step length: forwards and backwards, its gain at rest, and its states (n,) resting at input 1."""
+    """A block at one step length: its systems in both directions, gain at rest, and states (n,) at rest at input 1."""
 
     effect: Effect
     numbers: Array

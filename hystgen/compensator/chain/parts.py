@@ -55,7 +55,7 @@ SENT = tuple(part for part in _CATALOGUE if part.place is Place.DRIVE and part.f
 """Parts between the drive and the amplifier."""
 
 AHEAD = (*_at(Place.DRIVE), OWN_AHEAD)
-"""Parts in front of the plays, from the amplifier on. In front of two branches only the first is led."""
+"""Parts in front of the plays, from the amplifier on. If the front has two branches, only the first (lag) is led."""
 
 _first, *_others = _at(Place.LINEAR, Place.GAIN, forward=True)
 BEHIND = (_first, OWN_BEHIND, *_others)

@@ -88,7 +88,7 @@ def taps(
         mean = np.full(corner, 1.0 / corner)
         weights = np.convolve(weights, np.convolve(np.convolve(mean, mean), mean))
         first -= 3 * (corner - 1) // 2
-        if corner % 2 == 0:  # an odd number of samples has no middle one
+        if corner % 2 == 0:  # an even number of samples has no middle one
             weights = np.convolve(weights, np.array([0.5, 0.5]))
             first -= 1
     return Taps(first, weights)
@@ -221,8 +221,8 @@ def preview_repeat(line: PreviewLine) -> None:
 
 
 def targeting(product: Answer) -> Answer:
-    """A function for the output to reach at this sample, the weighted sum of the line, in an arithmetic with this
-    product of a number and a factor of an array."""
+    """The function that returns the output to reach at this sample, the weighted sum of the line; `product`: of a
+    number and a factor from an array."""
 
     @jit
     def preview_target(tap: Reals, line: PreviewLine) -> Scalar:

@@ -58,7 +58,7 @@ class QuietState(Struct):
 
     arrived: Signal  # in front of the plays
     reference: Signal
-    equal: UInt32  # references in a row, counted up to one more than are needed for the drive to stand still
+    equal: UInt32  # number of equal references in a row, at most one more than makes the drive stand still
 
 
 class SteadyState(Struct):
@@ -128,7 +128,7 @@ class Conversions(NamedTuple):
     level_signal: Answer
     drive_code: Answer
     output_code: LimitedAnswer  # with status bits
-    entered_travel: Answer  # a travel as verification sets it
+    entered_travel: Answer  # a travel that verification sets
     shared: Answer  # a share of a signal
 
 
@@ -139,7 +139,7 @@ def made_of(
     own blocks in front of the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
-    clock: Any = every[CLOCK]  # which has all of the following
+    clock: Any = every[CLOCK]  # has all of the verbs below
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
     travelled_by = every[AGED].travelled
     assert travelled_by
@@ -194,8 +194,8 @@ def made_of(
 
     @jit(inline=True)
     def turns(t: ChainTables, back: Scalar, way: Scalar) -> bool:
-        """Whether a drive that should go back by `back` turns to the other branch, `way` from there. If it leads a lag,
-        it turns only if holding misses by more than the lag would in the first sample of a turn over `way`."""
+        """Whether a drive that should go back by `back` turns to the other branch, which is `way` away. If it leads a
+        lag, it turns only if holding misses by more than the lag would in the first sample of a turn over `way`."""
         missed = back - t.plays.limits.hold[0]
         if not t.turning:
             return bool(missed > 0)
@@ -227,7 +227,7 @@ def made_of(
 
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
-        """Settle everything."""
+        """Record that the lag is at rest."""
         s.steady.way[0] = t.limits.zero[0]
         s.steady.moved[0] = t.limits.zero[0]
         s.steady.rises[0] = 1
@@ -500,7 +500,7 @@ def made_of(
         put_offset(t, s, s.own.offset[0] + more)
 
     def setting(put: Check) -> Action:
-        """A call that sets a number in the blocks by `put`."""
+        """A call that sets a number in the blocks through `put`."""
 
         @jit
         def set_number(t: ChainTables, s: ChainState, x: Scalar) -> None:
