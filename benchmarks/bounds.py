@@ -151,7 +151,7 @@ class Measured:
         moves = self.compiled.tables.moving.moves != PLAIN
         low, high = output_range(self.compiled.static, self.compiled.parts, T)
         y = self.model.simulate(v, t=self.t, extra=extra)
-        y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # also beyond the reachable range
+        y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # some are out of reach
         u = self.given(y, self.output)
         if self.compiled.codes is not None:
             most = float(self.compiled.tables.limits.code_max[0])

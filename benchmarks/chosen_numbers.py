@@ -100,7 +100,7 @@ def lag() -> None:
 
 
 def newton() -> None:
-    """Newton steps from the reciprocal of the old gain to that of the new one."""
+    """Number of Newton steps from the reciprocal of the old gain to that of the new gain."""
     print("newton: change of the gain in one step, iterations to 2^-24 and to 2^-53")
     for change in (0.1, 0.25, 0.5, 0.75, 0.9):
         iterations = [
@@ -240,7 +240,7 @@ def quiet() -> None:
 
 
 def averages() -> None:
-    """Errors on smooth references of averages, and of poles in front of the lead with the same noise gain.
+    """Errors of averages on smooth references, and of poles in front of the lead with the same noise gain.
 
     References are sines of equal size with 60 to 480 samples a period; errors are rms, in % of the reference. With a
     preview, the poles are advanced by the number of samples that suits them best; without one, averages look back.

@@ -32,8 +32,8 @@ from hystgen.records import Record, read_record
 Array = NDArray[np.float64]
 
 PLAYS, LEVELS, LAGS = 16, 16, 32
-"""Sizes of the baselines, not tuned to any error: as many plays as levels of the relays, and enough past samples of the
-drive to cover 0.16 s of the P-885 records."""
+"""Sizes of the baselines, not tuned to any error: as many plays as relay levels, and enough past samples of the drive
+to cover 0.16 s of the P-885 records."""
 
 REPORTED = {
     "loops run clockwise": "clockwise",

@@ -416,7 +416,7 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = Fal
                 out[k] = play
             rows.append(out)
         behind = max(int(np.argmax(x)), int(np.argmin(x)))
-        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # its start memory is wiped too late
+        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # the record's start memory is wiped too late
             continue
         used = behind + np.flatnonzero(~(without_steps & beside_steps(x)[behind:]))
         part = np.stack(rows)[:, used]

@@ -45,8 +45,8 @@ SAMPLES, HELD, LEAD = 600, 800, 400
 With 300 or 1200, 400, and 200 instead, no median ratio of seeds 0:8 changes by more than 0.08 or exceeds `COST`."""
 
 INSIDE = 0.7
-"""[share of the fitted range] Range of the inner held-out loops, which stay well within the extremes, where an unknown
-start shows most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
+"""[fraction of the fitted range] Range of the inner held-out loops, which stay well within the extremes, where an
+unknown start shows most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
 
 COST = 1.1
 """[times] The most that an unknown start may cost: a tenth, which a user would hardly notice in a held-out error."""

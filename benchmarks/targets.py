@@ -245,7 +245,7 @@ def trials(case: Case) -> Iterator[Reals]:
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
         if size < LONG:
             yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
-        yield turns  # and without them
+        yield turns  # and without full swings
     for points in corner_lists(case.n):
         for jump in landings(case, points, 2000 // case.n + 20):
             yield np.append(points, jump)
@@ -432,7 +432,7 @@ class Bench:
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
-        """The loop with its tables; in fixed point codes are twice as coarse, so that sums of two fit."""
+        """The loop with its tables; in fixed point, codes are twice as coarse, so that the sum of two fits."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
         cascade = case.model.cascade
@@ -444,7 +444,7 @@ class Bench:
         if case.arithmetic in ("q31", "q15"):
             drive, output = (2 * lsb for lsb in lsbs(case))
             into, out = (drive, output) if forward else (output, drive)
-            # bits of the sum, less a sign, less those of a number, less those of the steepest gain
+            # bits of the sum without its sign, minus those of a number and those of the steepest gain
             gain = sum(abs(p) for p in pi.weights) * into / out
             fraction = (62 if case.arithmetic == "q31" else 30) - (30 if case.arithmetic == "q31" else 14)
             fraction -= max(0, math.ceil(math.log2(gain))) + 1

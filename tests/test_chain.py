@@ -170,7 +170,7 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
     error = np.abs(one.simulate(v * drive, t=t) / output - u)
     kept = 2.0 * unit * float(numbers.tables.number.dither[0]) + 0.5 * drive * (numbers.codes is not None)
     allowed = 1.1 * one.cascade.pi.slopes[-1] * one.cascade.front_slopes[1] * kept / output  # creep adds 10 %
-    allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # between two samples
+    allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # interpolation error
     for end in (120 + held, len(u)):
         still = slice(end - 100, end - numbers.ahead)
         way = np.sign(np.diff(v[still]))
@@ -936,7 +936,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """It is checked with the cheaper engine, then with the loop engine."""
+    """Memory is checked with the cheaper engine, then with the loop engine."""
     one = noisy(name)
     for engine in dict.fromkeys([one.engine("auto", operator(name), arithmetic), "loop"]):
         memory_is_that_of_the_compiler(one, arithmetic, engine, tmp_path / engine)

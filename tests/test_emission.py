@@ -332,7 +332,7 @@ def test_unknown_precision_is_refused_and_says_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("x", [0, 7, -(2**31), 2**31 - 1, 2**31, -(2**31) - 1, -(3 * 10**9), -(2**63), 2**63 - 1])
 def test_whole_numbers_keep_their_value_in_every_dialect(x: int, tmp_path: Path) -> None:
-    """It holds without a warning on a core with 32-bit `long`, where C90 takes 3000000000 as unsigned."""
+    """Constants cause no warning on a core with 32-bit `long` either, where C90 takes 3000000000 as unsigned."""
     zig = next((compiler for compiler in required_compilers() if compiler.name == "zig"), None)
     assert zig
     half = x // 2 if x % 2 == 0 else (x - 1) // 2  # so that the test itself needs no large literal
@@ -481,7 +481,7 @@ def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, most:
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
 def test_nothing_is_copied_by_a_function_of_the_library(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """For a Cortex-M0+, gcc would copy structures of more than 16 bytes by memcpy."""
+    """For a Cortex-M0+, gcc would copy structures of more than 16 bytes by a call of memcpy."""
     hystgen.emit(model(name), tmp_path, operator="both", arithmetic=arithmetic, engine="corners")
     core = ["arm-none-eabi-gcc", "-std=c99", "-mcpu=cortex-m0plus", "-mthumb"]
     for level in ("-O0", "-Os", "-O2"):
@@ -675,7 +675,7 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
                 for optimize, of in costs.items():
                     cheaper = "corners" if of["corners"] < of["loop"] else "loop"
                     if effects and optimize != "speed" and arithmetic in ("q31", "q15"):
-                        cheaper = "loop"  # its stack is known to stay within 128 bytes
+                        cheaper = "loop"  # the loop's stack is known to stay within 128 bytes
                     assert choose("auto", optimize, cascade, operator, arithmetic, effects) == cheaper
                     chosen.add((optimize, cheaper))
     assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen
@@ -736,7 +736,7 @@ def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
     ("curved", {"operator": "inverse", "arithmetic": "q15", "engine": "corners"}),
 ])  # fmt: skip
 def test_golden(name: str, options: dict[str, str]) -> None:
-    """The emitted C is the reviewed copy; HYSTGEN_UPDATE_GOLDEN=1 renews it."""
+    """The emitted C equals the reviewed copy; HYSTGEN_UPDATE_GOLDEN=1 renews the copy."""
     folder = GOLDEN / name
     if os.environ.get("HYSTGEN_UPDATE_GOLDEN"):
         for stale in folder.glob("*"):

@@ -79,7 +79,7 @@ def draw(rng: np.random.Generator, low: float, high: float, span_out: float, kin
     mean = float(masses @ radii)
     width = rng.uniform(0.02, 0.15)
     most = 1.0 / LEAST_P0_SHARE - 1.0
-    # Loop width over output range, 2 c mean / (span + c (span - 2 mean)), solved for the total weight c beside p0 = 1
+    # Loop width over output range, 2 c mean / (span + c (span - 2 mean)), solved for the total weight c if p0 = 1
     below = 2.0 * mean * (1.0 + width) - width * span
     total = min(width * span / below, most) if below > 0.0 else most
     out = span * (1.0 + total) - 2.0 * total * mean

@@ -24,7 +24,7 @@ class Scene:
 
 
 Fault = Callable[[np.random.Generator, list[Scene], list[Array], list[Array]], dict[str, float]]
-"""Changes the measured columns v and y of the records in place and returns its numbers for the label."""
+"""Function that changes the measured columns v and y in place and returns the fault's parameters for the label."""
 
 
 def hum(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: list[Array]) -> dict[str, float]:

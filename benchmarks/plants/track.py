@@ -51,7 +51,7 @@ SLOWEST = 60
 """Samples in the fastest half wave of a reference."""
 
 GOOD = 2.0, 0.05
-"""A good compensator leaves at most this multiple of the held-out residual, or this many per cent."""
+"""The error of a good compensator is at most this multiple of the held-out residual, or this many per cent."""
 
 INSIDE = 0.1
 """Distance of a reference from the ends of the output, as a fraction of the output's range over the drive range."""

@@ -751,7 +751,7 @@ def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) 
 
 
 def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
-    """Whether an effect removes enough from fitted records, although not from held-out ones."""
+    """Whether an effect removes enough from fitted records, whatever it removes from held-out ones."""
     _, fitted = _removed(now, tried, records)
     return fitted.removed >= _least(now) * max(records.noise, fitted.left)
 
@@ -794,7 +794,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights from a linear fit without, then with the effects: a sensor's curve misleads far from its range."""
+    """Weights from linear fits without, then with the effects: far from its range, a sensor's curve misleads a fit."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -826,7 +826,7 @@ def _exchanged(
 
     The first of two effects was chosen while the second was missing, and may have absorbed part of it; the second was
     then chosen next to a wrong first one. Rivals, too, are judged with all other effects present. `less`: the models
-    without one effect, as far as known; `names`: effects to search again, the best of some round.
+    without one effect, as far as known; `names`: effects to be searched again, each the best of some round.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
