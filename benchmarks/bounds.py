@@ -1,16 +1,16 @@
-"""Measure how much of its stated error bounds a search reaches, for random models with effects in every arithmetic.
+"""Search for errors of random models with effects in every arithmetic, and compare them with the stated bounds.
 
     python benchmarks/bounds.py [--seeds 0:3] [--arithmetic float32,q15] [--effects creep,viscous] [--tries 40]
 
 For each effect and seed, a search looks for the largest error of either operator. Its drives consist of sweeps, holds,
-jumps, noise, and shaking at the fastest step for which the bounds hold; later it varies the end of the worst drive so
-far. The inverse gets the output of the model for such a drive as its reference. Exact answers come from the double
-model, `model.simulate` forwards and `hystgen.compensator.chained` backwards, which share no tables with the C except
-for the verbs of lag and creep. Where a bound holds for compensators that have seen the same drives, they come from the
-tables in double precision, to which the sent drives are committed. A line is printed for each operator: the median and
-the largest ratio of bound to error, and the number of exceeded bounds, which has to be 0.
+jumps, noise, and shaking at the largest step for which the bounds hold; later it varies the end of the worst drive so
+far. The inverse gets the model's output for such a drive as its reference. Exact answers come from the double model,
+`model.simulate` forwards and `hystgen.compensator.chained` backwards, which share no tables with the C except for the
+verbs of lag and creep. Where a bound compares compensators that have seen the same drives, exact answers come from the
+double-precision tables, to which the drives sent are committed. A line for each operator gives the median and the
+largest ratio of bound to error, and the number of exceeded bounds, which must be 0.
 
-A search may miss the largest error, so a ratio only limits the slack of a bound from above.
+A search may miss the largest error, so a ratio is only an upper limit of a bound's slack.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ Generator = np.random.Generator
 
 T, LENGTH = 1e-3, 600
 """[s, samples] Sample time and length of a record. The time constants below are chosen in samples, so the sample time
-only sets their unit. Longer records find more of errors that add up: random models reach 1/44 of a dashpot's forward
-bound in 600 samples, and one of them, shaken, reaches a quarter in 1e5."""
+only sets their unit. Errors that add up come closer to their bounds in longer records: random models reach 1/44 of a
+dashpot's forward bound in 600 samples, and one of them, shaken, reaches a quarter in 1e5."""
 
 RELAXING = "name: rate_dependence, shape: relaxation, time_constant"
 CENTRE = "name: noncongruent, shape: centre, centre: 1, width: 2, amplitude"
@@ -81,7 +81,7 @@ def drawn(name: str, seed: int) -> Model:
 
 
 def part(rng: Generator, step: float, low: float, high: float, begin: float) -> list[float]:
-    """A stretch of a drive from `begin` on that moves by at most `step` per sample."""
+    """A stretch of a drive, starting from `begin`, that moves by at most `step` per sample."""
     n, rate = int(rng.integers(2, 100)), step * float(rng.choice([1.0, rng.random()]))
     k = np.arange(n)
     moves = (
@@ -107,7 +107,7 @@ def grown(rng: Generator, step: float, low: float, high: float, begin: Sequence[
 
 
 class Measured:
-    """A model in an arithmetic, its bounds in physical units, and errors of either operator for a drive."""
+    """A model in one arithmetic, its bounds in physical units, and the errors of either operator for a drive."""
 
     def __init__(self, model: Model, arithmetic: str) -> None:
         self.model, self.compiled = model, tables.build(model.chain, arithmetic, T)
@@ -140,7 +140,7 @@ class Measured:
         extra = self._extra(self.compiled)
         found = answers(self.compiled, Run(self.t, given, extra), False).astype(float) * self.output
         exact = self.model.simulate(given * self.drive, t=self.t, extra=extra)
-        if self.compiled.codes is not None:  # a gain may take the output beyond its codes
+        if self.compiled.codes is not None:  # a gain may take the output out of the range of codes
             most = float(self.compiled.tables.limits.code_max[0]) * self.output
             exact = np.clip(exact, -most, most)
         return float(np.max(np.abs(found - exact)))
@@ -151,7 +151,7 @@ class Measured:
         moves = self.compiled.tables.moving.moves != PLAIN
         low, high = output_range(self.compiled.static, self.compiled.parts, T)
         y = self.model.simulate(v, t=self.t, extra=extra)
-        y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # also beyond what can be reached
+        y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # some are out of reach
         u = self.given(y, self.output)
         if self.compiled.codes is not None:
             most = float(self.compiled.tables.limits.code_max[0])

@@ -1,4 +1,4 @@
-"""Runs behind chosen numbers that no test of a model can set: what another value would cost or spoil.
+"""Runs behind chosen numbers that no test of a model can set: what other values would cost or break.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
         [quiet] [averages] [shifts] [branches] [noisy] [fast] [samples] [tries] [secants]
@@ -100,7 +100,7 @@ def lag() -> None:
 
 
 def newton() -> None:
-    """Newton steps from the reciprocal of the old gain to that of the new one."""
+    """Number of Newton steps from the reciprocal of the old gain to that of the new gain."""
     print("newton: change of the gain in one step, iterations to 2^-24 and to 2^-53")
     for change in (0.1, 0.25, 0.5, 0.75, 0.9):
         iterations = [
@@ -120,7 +120,7 @@ def decades() -> None:
 
 
 def sweeps() -> None:
-    """Rms contribution of an effect to the output over a number of sweeps, as a share of that over 64 sweeps."""
+    """Rms contribution of an effect to the output over a number of sweeps, relative to that over 64 sweeps."""
     counts = (1, 2, 4, 8, 16, 32)
     print("sweeps: effect, worth over", *counts, "sweeps / over 64")
     for effect in EFFECTS:
@@ -133,7 +133,7 @@ def sweeps() -> None:
 
 
 def unknown() -> None:
-    """The rms error of a fit over parts of a record, as a share of that over the whole record."""
+    """The rms error of a fit over parts of a record, relative to that over the whole record."""
     shares = (0.5, 0.2, 0.1, 0.05, 0.02)
     print("unknown: record, length of a part of it, least and largest rms over such a part / over all")
     fit = hystgen.identify(EXAMPLES / "stage_recording.csv")
@@ -150,8 +150,8 @@ def unknown() -> None:
 
 
 def exact() -> None:
-    """Largest change of held samples and largest bend of interpolated ones after rounding to digits, as shares of the
-    output's range."""
+    """Largest change of held samples and largest bend of interpolated ones after rounding to digits, as fractions of
+    the output's range."""
     print("exact: written with digits, offset / range, largest change where nothing was measured: held, interpolated")
     t = np.arange(4001)
     slow = np.arange(0, 4001, 8)
@@ -169,7 +169,7 @@ def exact() -> None:
 
 
 def lengths() -> None:
-    """Shares of a play sum's error explained without and with rates, on three rate-independent plants and one with
+    """Fractions of a play sum's error explained without and with rates, on three rate-independent plants and one with
     creep."""
     print("lengths: plant, error explained without rates / with them, by averages over 0, 2, 3, 4, 6 and 11 distances")
     t = 1e-3 * np.arange(12000)
@@ -195,7 +195,7 @@ def lengths() -> None:
 
 
 def visits() -> None:
-    """How much the output after a history depends on the number of samples in each of its moves."""
+    """How much the output after a history depends on the number of samples per move of that history."""
     samples = (25, 100, chain.VISIT_SAMPLES, 800)
     print(f"visits: effect, largest change, share of the answer's range: {samples} samples a move against 3200")
     v = np.concatenate([np.linspace(1.0, 3.0, 500), np.linspace(3.0, -2.0, 800)])
@@ -219,7 +219,7 @@ def visits() -> None:
 def quiet() -> None:
     """Error of a quiet drive on slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
 
-    The error is the rms difference between output and rounded reference after the first second, in output codes.
+    The error is the rms difference between the output and the rounded reference, in output codes, from 1 s on.
     """
     counts = (2, 8, layout.QUIET, 128)
     print(f"quiet: samples a code of the ramp; error led always, and quiet from {counts} equal references on; changes")
@@ -240,7 +240,7 @@ def quiet() -> None:
 
 
 def averages() -> None:
-    """Error of averages on smooth references, and of poles in front of the lead that keep the same noise gain.
+    """Errors of averages on smooth references, and of poles in front of the lead with the same noise gain.
 
     References are sines of equal size with 60 to 480 samples a period; errors are rms, in % of the reference. With a
     preview, the poles are advanced by the number of samples that suits them best; without one, averages look back.
@@ -279,9 +279,9 @@ def averages() -> None:
 
 
 def shifts() -> None:
-    """How close a search over random sequences of steps, in which plays follow partly, comes to `found_shifted`.
+    """How close a search over random sequences of steps, in which plays follow only in part, comes to `found_shifted`.
 
-    For given steps the largest error is `sum |c_ik|` over all shifts; the factors are computed backwards from the end.
+    For given steps, the largest error over all shifts is `sum |c_ik|`; the factors are computed backwards from the end.
     """
     print("shifts: largest error that a search finds, share of the bound; plays in order of thresholds, or in any")
     rng = np.random.default_rng(9)
@@ -308,14 +308,14 @@ def shifts() -> None:
 
 
 def _followed(rng: np.random.Generator, n: int, in_order: bool) -> NDArray[np.float64]:
-    """Share (n,) of its way that each play goes in a step; `in_order`: at most that of plays with smaller
-    thresholds."""
+    """Fraction (n,) of its move that each play completes in a step; `in_order`: plays with larger thresholds complete
+    no larger a fraction."""
     shares = np.where(rng.random(n) < rng.uniform(0.2, 0.9), rng.choice([1.0, 0.3, 0.1, 0.01], n), 0.0)
     return np.sort(shares)[::-1] if in_order else shares
 
 
 def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> float:
-    """Largest `e` with `p_0 e + sum p_i d_i = 0` after the steps, over all shifts of the input by up to 1 in each."""
+    """Largest `e` with `p_0 e + sum p_i d_i = 0` after the steps, if each step may shift the input by up to 1."""
     factor, total = -p[1:] / p[0], 0.0
     for shares in reversed(steps):
         kept = factor - p[1:] * float(shares @ factor) / float(p[0] + p[1:] @ shares)
@@ -325,8 +325,8 @@ def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> fl
 
 
 def branches() -> None:
-    """A lag in front of two branches 0.01 V apart, for several limits of the led move as a multiple of the previous
-    move: the error on sines of 100 and 400 samples from rest, and the overshoot of a step of 0.2 um out of a slow
+    """A lag in front of two branches 0.01 V apart, with the move of the lead limited to several multiples of the
+    previous move: errors on sines of 100 and 400 samples from rest, and overshoot of a step of 0.2 um after a slow
     ramp."""
     print("branches: times the move before, rms and largest error on sines of 100 and 400 samples, um, overshoot, um")
     curve = "a0: 6, a1: 0.4, a2: 0.1, a3:"
@@ -347,8 +347,8 @@ def branches() -> None:
 
 
 def noisy() -> None:
-    """Noise gain of lags, and noise of the drive for a reference with white noise of rms 1e-4 of its range: on a slow
-    ramp, where all plays follow, and after its turn, where none does."""
+    """Noise gain of lags, and drive noise for a reference with white noise, rms 1e-4 of its range: on a slow ramp,
+    where all plays follow, and after the ramp turns, when none does."""
     print("noisy: lag / step, noise gain, rms noise of the drive / its range on the ramp, behind its turn")
     rng = np.random.default_rng(1)
     for samples in (0.5, 1.0, 1.2, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 250.0):
@@ -367,8 +367,8 @@ def noisy() -> None:
 
 
 def fast() -> None:
-    """Effects that settle within a sample: how far they move the output at the fastest rate with a stated bound, in %
-    of its range."""
+    """Change of the output, in % of its range, due to effects that settle within a sample, at the fastest rate with a
+    stated bound."""
     shapes = ("lag, time_constant", "delay, time", "rate_dependence, shape: relaxation, time_constant")
     print("fast: step / time constant; lag, delay, relaxing plays")
     place = np.arange(8 * SAMPLES_A_SWEEP + 1) / SAMPLES_A_SWEEP
@@ -384,7 +384,7 @@ def fast() -> None:
 
 
 def samples() -> None:
-    """The largest error found over a growing number of samples, as a multiple of that over the largest number."""
+    """The largest error found in growing numbers of samples, relative to that found in the most samples."""
     counts = (200, 400, 800, 3000)
     print("samples:", *(f"{n:6}" for n in counts))
     for effect in ("lag, time_constant: 1.0e-3", "lag, time_constant: 1.0e-2",
@@ -411,7 +411,7 @@ model:
 
 
 def tries() -> None:
-    """Inputs that a search in float32 tries: on average and at most, with up to so many by Newton's method."""
+    """Mean and largest number of inputs that a float32 search tries, for several limits on Newton steps."""
     moved, steep = moving_float.MOVES.floating.tried, moving_float.BENDS.floating.steep
     values = (2, 4, 6, 8, 12)
     print("tries:", *(f"{value:8}" for value in values))
@@ -458,7 +458,7 @@ def tries() -> None:
 
 
 def secants() -> None:
-    """Inputs that a search in fixed point tries, on average and at most, with up to so many by secants."""
+    """Mean and largest number of inputs that a fixed-point search tries, for several limits on secant steps."""
     moved, bent = MOVES.coded().moved, BENDS.coded().bent
     values = (2, 4, 6, 8, 10, 12, 20)
     print("secants:", *(f"{each:10}" for each in values))
@@ -509,7 +509,7 @@ RUNS: dict[str, Callable[[], None]] = {
 
 
 def main() -> None:
-    """Print the tables asked for, or all."""
+    """Print the requested tables, or all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=", ".join(RUNS))
     for name in parser.parse_args().names or RUNS:

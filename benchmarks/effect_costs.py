@@ -2,13 +2,13 @@
 
     python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
 
-Code is that of a module at -O2, the larger of zig and gcc (RISC-V: zig only); instructions are the mean over a slow
-sine in a strict -O2 build of zig, of the inverse, or of the forward operator for parts that only it has. `any` is what
-any effect adds, measured with a gain, the cheapest one (`any_corners`: code with engine corners); the other rows have
-the difference from that, which may be negative. Plays that a search finds have `dilated` in common, and their rows have
-what they take beyond it; `braked` is what a lag and a slew limit together take beyond their sum, `quiet` what it takes
-beyond a lag. `effect_sizes.csv`, the source of figures in the banner of emitted files, has the code on the two cores of
-`hystgen.compensator.engines`; `docs/effects.csv` has all cores.
+Code is a module's size at -O2, the larger of zig and gcc (RISC-V: zig only); instructions are the mean over a slow sine
+in a strict -O2 build of zig, for the inverse, or for the forward operator if only it has the part. `any` is the cost of
+having any effect, measured with a gain, the cheapest one (`any_corners`: code with the corner engine); the other rows
+have the difference from that, which may be negative. Plays whose input is searched for have `dilated` in common, and
+their rows have the cost beyond it; `braked` is the cost of a lag and a slew limit together beyond their sum, `quiet`
+its cost beyond a lag. `effect_sizes.csv`, from which the banner of emitted files takes its figures, has the code on the
+two cores of `hystgen.compensator.engines`; `docs/effects.csv` has all cores.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ EFFECTS = {
 }
 """A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
 OTHERS = {"dilated": "0", "polynomial": "[0.02]"}
-"""The value for each play but the first."""
+"""The value, once for each play but the first."""
 assert {"any", *EFFECTS} == set(PARTS)
 
 
@@ -110,7 +110,7 @@ def measured(
 
 
 def together(apart: list[Measures], least: Measures) -> Measures:
-    """The cost of a model of several effects if each added as much as it does by itself."""
+    """The cost of a model with several effects if each added as much as it does alone."""
 
     def added(of: Sequence[dict[str, Any]], base: dict[str, Any]) -> dict[str, Any]:
         return {core: sum(each[core] for each in of) - (len(of) - 1) * base[core] for core in base}

@@ -49,7 +49,7 @@ CASES: tuple[dict[str, Any], ...] = (
 
 
 def effect(case: dict[str, Any]) -> Effect:
-    """The effect of a case, in the shape it names or else the first one."""
+    """The effect of a case, in the named shape or else in its first one."""
     shapes = effects.shapes(case["name"])
     word = case.get(shapes[0].selector)
     chosen = next((s for s in shapes if word and word in s.model_fields[s.selector].annotation.__args__), shapes[0])

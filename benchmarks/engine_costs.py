@@ -1,12 +1,12 @@
-"""Measure the costs by which `engine: auto` chooses: instructions per sample of each engine for few plays, and code.
+"""Measure the costs by which `engine: auto` chooses: code size, and each engine's instructions per sample.
 
     python benchmarks/engine_costs.py [-o hystgen]
 
 Instructions are the mean over a decaying multisine in a strict -O2 build of zig, for both operators and every
 arithmetic, with and without a memoryless part (a dead zone); models with a gain, the cheapest effect, are measured at
-fewer numbers of plays. Code is that of a module at -O2, the larger of zig and gcc, for every kind that
+fewer numbers of plays. Code is a module's size at -O2, the larger of zig and gcc, for every kind that
 `hystgen.compensator.engines.kind` distinguishes. Both are measured on a Cortex-M0+ without and a Cortex-M4F with an
-FPU. `hystgen.compensator.engines` reads the shipped tables, so the same parameters give the same C everywhere.
+FPU. `hystgen.compensator.engines` reads the tables as shipped, so the same parameters give the same C everywhere.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
-CODE_PLAYS = 10  # plays at which code is measured; 64 change it by at most 16 bytes (gcc, float32 and q31, both cores)
+CODE_PLAYS = 10  # code is measured with these plays; 64 change it by at most 16 bytes (gcc, float32, q31, both cores)
 KINDS = ("pi", "gpi", "effects", "gpi_effects")
 GAIN = "  effects: [{name: thermal, gain_per_degree: 0.001}]\nsample_time: 1.0e-3\n"
 EFFECT_PLAYS = (1, 4, 16)
 """Plays of models with effects; a model takes the nearest row at or below its number. Three rows suffice: from 1 to 16
-plays, corners grows by 3 %, and loop by 1240 to 1364 instructions a play (float32, inverse, M0+; rows `effects`)."""
+plays, the corner engine grows by 3 %, the loop engine by 1240 to 1364 instructions per play (float32, inverse, M0+)."""
 DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
 TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"
 BRANCHES = TANH[:-1] + ", descending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.5}}"
@@ -66,7 +66,7 @@ def model(n: int, front: str, effects: str = "") -> Model:
 
 
 def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict[str, dict[str, float]]:
-    """Mean instructions of a sample on each core, for each operator."""
+    """Mean instructions per sample on each core, for each operator."""
     one = model(n, DEAD_ZONE if kind.startswith("gpi") else "", GAIN if kind.endswith("effects") else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
@@ -95,7 +95,7 @@ def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> 
 
 
 def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:
-    """Bytes of code of a module on each core without constant tables, the larger of both compilers."""
+    """Bytes of code of a module without its constant tables on each core, the larger of both compilers."""
     one = model(CODE_PLAYS, FRONTS[kind])
     assert engines.kind(one.cascade, arithmetic) == kind
     options = emit_options(one, operator, arithmetic, engine)

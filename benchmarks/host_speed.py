@@ -3,7 +3,7 @@
     python benchmarks/host_speed.py [--check]
 
 1. Simulating 10^6 samples through 64 plays, against the textbook sample loop in numpy (each play a row of an array).
-2. `hystgen emit` of a small parameter file, from start to end, against `python -c "import numpy, jinja2"`.
+2. The whole of `hystgen emit` for a small parameter file, against `python -c "import numpy, jinja2"`.
 
 With `--check` the exit code is 1 if a ratio misses its target.
 """
@@ -61,7 +61,7 @@ def simulation(name: str, v: NDArray[np.float64]) -> float:
     r = np.linspace(0.0, 5.0, PLAYS + 1)
     p = np.concatenate([[1.0], np.full(PLAYS, 0.05)])
     model = PI(r.tolist(), p.tolist())
-    model.simulate(v[:1000])  # compiles, unless that is cached
+    model.simulate(v[:1000])  # compiles, unless cached
     y = textbook(v, r, p)
     gap = float(np.max(np.abs(y - model.simulate(v))))
     assert gap < 1e-10, gap
@@ -101,7 +101,7 @@ def main() -> int:
     signals = {
         "decaying sine": 8 * np.sin(600 * k) * np.linspace(1, 0.1, SAMPLES),
         "random walk": np.cumsum(rng.normal(0, 0.05, SAMPLES)),
-        "white noise": rng.uniform(-8, 8, SAMPLES),  # every sample a reversal across many plays: the worst case
+        "white noise": rng.uniform(-8, 8, SAMPLES),  # every sample reverses across many plays: the worst case
     }
     print(f"{SAMPLES} samples, {PLAYS} plays      numpy loop       hystgen")
     ratios = {name: simulation(name, v) for name, v in signals.items()}

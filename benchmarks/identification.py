@@ -2,10 +2,10 @@
 
     python benchmarks/identification.py [--check] [--large]
 
-For 200 000 samples and 64 thresholds it prints the seconds of both in the same run on one thread, including those to
-build the regressor matrix, and by how much their residuals differ. `--large` also fits a record of 10^7 samples and
-prints the memory used beyond the record. `--check`: exit 1 unless the ratio is at least 10, the residuals agree to a
-relative 1e-6 and, with `--large`, memory does not grow with the number of thresholds.
+For 200 000 samples and 64 thresholds it prints the seconds that both take in the same run on one thread, including the
+construction of the regressor matrix, and the difference of their residuals. `--large` also fits a record of 10^7
+samples and prints the memory used beyond the record. `--check`: exit 1 unless the ratio is at least 10, the residuals
+agree to a relative 1e-6 and, with `--large`, memory does not grow with the number of thresholds.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def drives(samples: int) -> dict[str, Array]:
 
 
 def best(run: Callable[[], object]) -> float:
-    """Least seconds of a few runs."""
+    """Shortest time of a few runs, s."""
     times = []
     for _ in range(RUNS):
         began = time.perf_counter()
@@ -80,7 +80,7 @@ def compare(v: Array) -> tuple[float, float, float]:
 
 
 def fit(samples: int, plays: int | None) -> tuple[float, float]:
-    """Seconds of a fit, and its peak memory beyond the record in bytes; to be called in a process of its own."""
+    """Seconds taken by a fit, and its peak memory beyond the record in bytes; call it in a separate process."""
     v = drives(samples)["noisy ramps"]
     y = operators.plays(v, [0.0, 5.0, 20.0], 0.0).T @ [0.5, 0.2, 0.1]
     record = Record("made", np.arange(samples) * 1e-5, v, y, sample_time=1e-5)
@@ -93,7 +93,7 @@ def fit(samples: int, plays: int | None) -> tuple[float, float]:
 
 
 def apart(samples: int, plays: int | None) -> tuple[float, float]:
-    """`fit` in a new process, so that the peak is its own."""
+    """`fit` in a new process, so that the peak memory is its own."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(fit, (samples, plays))
 

@@ -1,8 +1,8 @@
 """Memory and time of reading one large record in every format.
 
 `python benchmarks/record_memory.py --samples 10000000` writes a record of t, v, y in each format with the format's own
-library, reads each in a process of its own and prints the growth of the resident set, at its highest and after reading,
-in units of the arrays that are kept (24 bytes a sample), and the seconds.
+library, reads each in a separate process and prints the growth of the resident set, at its peak and after reading, in
+units of the arrays that are kept (24 bytes per sample), and the seconds taken.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ print(json.dumps({"samples": len(record), "seconds": seconds, "peak": (status("V
 
 
 def columns(samples: int) -> dict[str, np.ndarray]:
-    """A drive with all its digits, as a recorder that writes doubles gives it."""
+    """A drive with all its digits, as written by a recorder that stores doubles."""
     rng = np.random.default_rng(0)
     t = np.arange(samples) * 5e-5
     v = 50.0 * np.sin(t) + rng.normal(0.0, 0.1, samples)
@@ -93,7 +93,7 @@ def write_files(samples: int, folder: Path) -> Iterator[Path]:
 
 
 def measure(path: Path) -> dict[str, float]:
-    """Read one file in a process of its own."""
+    """Read one file in a separate process."""
     done = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, text=True, check=True)
     found: dict[str, float] = json.loads(done.stdout)
     return found

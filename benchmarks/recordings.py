@@ -1,13 +1,13 @@
-"""Held-out errors on measured recordings, beside those of plain baselines fitted to the same samples.
+"""Held-out errors on measured recordings, compared with those of plain baselines fitted to the same samples.
 
     python benchmarks/recordings.py FOLDER [--only NAME ...] [-o docs/recordings.csv]
 
 `FOLDER` holds the recordings named in `SETS` (columns t, v, y), which belong to others and are not part of this
 project. Errors are rms with a free offset, in % of the range of the held-out output, over the samples that both
 `identify` and `diagnose` compare. The baselines are fitted by least squares: a straight line; 16 plays with weights of
-either sign; Preisach relays on 16 x 16 levels; a cubic beside the plays; `LAGS` past samples of the drive beside the
-plays. `diagnosed`: error after `diagnose`, which starts from the model of `auto`; `s`: its time. `best`: error of the
-best baseline over `diagnosed`.
+either sign; Preisach relays on 16 x 16 levels; plays with a cubic; plays with `LAGS` past samples of the drive.
+`diagnosed`: error after `diagnose`, which starts from the model of `auto`; `s`: its time. `best`: error of the best
+baseline divided by `diagnosed`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from hystgen.records import Record, read_record
 Array = NDArray[np.float64]
 
 PLAYS, LEVELS, LAGS = 16, 16, 32
-"""Sizes of the baselines, not tuned to any error: as many plays as levels of the relays, and enough past samples of the
-drive to cover 0.16 s of the P-885 records."""
+"""Sizes of the baselines, not tuned to any error: as many plays as relay levels, and enough past samples of the drive
+to cover 0.16 s of the P-885 records."""
 
 REPORTED = {
     "loops run clockwise": "clockwise",
@@ -44,14 +44,14 @@ REPORTED = {
     "too few samples to judge": "start unknown",
     "can be compared": "too short",
 }
-"""Parts of the program's messages about recordings, and short words for them."""
+"""Parts of the program's messages about recordings, and abbreviations for them."""
 
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh", "auto")
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a recording, from `first` to `last` as shares of its samples."""
+    """A part of a recording, from `first` to `last` as fractions of its samples."""
 
     file: str
     first: float = 0.0
@@ -241,7 +241,7 @@ def row(name: str, folder: Path) -> dict[str, str]:
 
 
 def reported(says: str) -> str:
-    """The messages about a recording in short words."""
+    """The messages about a recording, abbreviated."""
     return ", ".join(short for text, short in REPORTED.items() if text in says)
 
 

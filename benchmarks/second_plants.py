@@ -1,10 +1,10 @@
 """A second simulator of plants for `hystgen diagnose`, which shares nothing with the first (`benchmarks/plants`).
 
-The records are short (450 to 900 samples), as a laboratory takes them. Hysteresis comes from an Everett function with a
-stack of extremes and from a friction element's differential equation; each effect has an equation of its own.
-Disturbances outside the catalogue are another axis that steps at random, room temperature acting on the gain, weights
-that change with time, slow sinusoidal crosstalk, and a guide that sticks. Cases and labels have the layout of
-`benchmarks.plants`, which runs and scores them:
+The records are short (450 to 900 samples), as in a laboratory. Hysteresis comes from an Everett function with a stack
+of extremes and from a friction element's differential equation; each effect has its own equation. Disturbances outside
+the catalogue are random steps of another axis, room temperature acting on the gain, weights that change with time, slow
+sinusoidal crosstalk, and a sticking guide. Cases and labels have the layout of `benchmarks.plants`, which runs and
+scores them:
 
     python -m benchmarks.second_plants --kind single --seeds 0:30 -o build/second
     python -m benchmarks.plants run build/second/cases -o build/second/results
@@ -30,12 +30,12 @@ FINER = 4
 """Fine steps per sample."""
 
 NOISE = 4e-4
-"""rms noise as a share of the output range."""
+"""rms noise as a fraction of the output range."""
 
 TAU = 2.0 * np.pi
 
 LATE, RESOLVED = 30.0, 1.5
-"""[samples] Lateness of the strongest lag or delay, and lateness below which lag and delay look the same."""
+"""[samples] Delay of the strongest lag or delay, and the delay below which both look the same."""
 
 
 # A session: records with gaps between them, on one fine time axis ---------------------------------------------
@@ -60,7 +60,7 @@ def _triangle(t: Array, periods: float) -> Array:
 
 
 def drives(rng: np.random.Generator) -> list[tuple[str, bool, Callable[[Array], Array]]]:
-    """Name, held out or not, and drive between 0 and 1 as a function of the share of the record's time."""
+    """Name, held out or not, and drive from 0 to 1 as a function of the elapsed fraction of the record's time."""
     levels = rng.uniform(0.0, 1.0, 6)
     more = rng.uniform(0.0, 1.0, 5)
     phases = rng.uniform(0.0, TAU, 5)
@@ -138,18 +138,17 @@ def sampled(fine: Array, part: slice) -> Array:
 
 @dataclass(frozen=True)
 class Stage:
-    """The Everett function of a move by d is `d (slope + second d + third d^2)` all over the range; friction is
-    added."""
+    """The Everett function of a move by d is `d (slope + second d + third d^2)` everywhere; friction is added."""
 
     slope: float
     second: float
     third: float
     friction: float
     centre: float = 0.0
-    """Relative growth of a move per range of its distance above the middle, which makes loops not congruent."""
+    """Relative growth of a move's output per drive range above the middle, which makes loops non-congruent."""
 
     def moved(self, v: Array) -> tuple[Array, Array]:
-        """The reversible part of the output, and the rest, for a drive in ranges that starts from 0."""
+        """The reversible and the irreversible part of the output, for a drive in ranges that starts from 0."""
         return self.slope * v, self._everett(v) + self._friction(v)
 
     def _everett(self, v: Array) -> Array:
@@ -193,8 +192,7 @@ class Stage:
 
 @dataclass
 class Plant:
-    """Changes by effects to the drive, the irreversible part and the output, each called with signals on the fine
-    grid."""
+    """Changes that effects make to drive, irreversible part and output, each called with signals on the fine grid."""
 
     drive: list[Callable[[Session, Array], Array]]
     rest: list[Callable[[Session, Array], Array]]
@@ -217,7 +215,7 @@ class Plant:
 
 
 def filtered(t: Array, x: Array, time: float) -> Array:
-    """A first-order lag on uneven times; the input steps halfway between two of them."""
+    """A first-order lag on uneven times; the input steps halfway between consecutive times."""
     out = np.empty(len(x))
     state, last, kept = float(x[0]), float(x[0]), np.exp(-0.5 * np.diff(t, prepend=t[0]) / time).tolist()
     for k, (value, keep) in enumerate(zip(x.tolist(), kept, strict=True)):
@@ -228,7 +226,7 @@ def filtered(t: Array, x: Array, time: float) -> Array:
 
 
 def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
-    """A vibration mode driven by x, which steps halfway between two times; its rotation is exact."""
+    """A vibration mode driven by x, which steps halfway between consecutive times; its rotation is exact."""
     out = np.empty(len(x))
     w, dt = TAU * frequency, np.diff(t, prepend=t[0])
     damped = w * np.sqrt(1.0 - damping**2)
@@ -240,7 +238,7 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
             fade * (b * c - (w * w * a + damping * w * b) / damped * s),
         )
 
-    a, b = 0.0, 0.0  # deviation from x and its speed
+    a, b = 0.0, 0.0  # deviation from x, and its rate
     last = float(x[0])
     for k, (value, step) in enumerate(zip(x.tolist(), dt.tolist(), strict=True)):
         a, b = turned(a, b, 0.5 * step)
@@ -250,7 +248,7 @@ def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
 
 
 Effect = Callable[[np.random.Generator, Session, float, Plant], None]
-"""Adds an effect to a plant, with a strength of about 0.01 to 1."""
+"""Function that adds an effect to a plant, with a strength of about 0.01 to 1."""
 
 
 def creep(rng: np.random.Generator, made: Session, x: float, plant: Plant) -> None:
@@ -348,10 +346,10 @@ EFFECTS: dict[str, tuple[Effect, bool]] = {
     "saturation": (saturation, False), "thermal": (thermal, True), "drift": (drift, True), "ageing": (ageing, True),
     "sensor_nonlinearity": (sensor_nonlinearity, False), "noncongruent": (noncongruent, False),
 }  # fmt: skip
-"""Each effect, and whether it needs a slow session."""
+"""All effects, with whether each needs a slow session."""
 
 
-# Disturbances: no effects of the actuator -------------------------------------------------------------------
+# Disturbances, which are not effects of the actuator --------------------------------------------------------
 
 
 def other_axis(rng: np.random.Generator, made: Session, x: float, y: Array) -> Array:
@@ -392,7 +390,7 @@ FOREIGN = {each.__name__: each for each in (other_axis, room, changing_weights, 
 
 
 def beside_steps(x: Array) -> NDArray[np.bool_]:
-    """The samples within two of a fast step of the drive x (in ranges), one that takes at most two samples."""
+    """The samples within two of a fast step, of at most two samples, of the drive x (in ranges)."""
     near = np.zeros(len(x), dtype=bool)
     for k in range(1, len(x) - 3):
         size = abs(x[k + 2] - x[k])
@@ -404,8 +402,8 @@ def beside_steps(x: Array) -> NDArray[np.bool_]:
 def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = False) -> float:
     """rms residual of a linear least-squares fit of plays with weights of any sign and an offset per record.
 
-    All records together, each from its later extreme on; thresholds up to half the range. `without_steps`: without the
-    samples `beside_steps`.
+    All records together, each from the later of its two extremes on; thresholds up to half the range. `without_steps`:
+    without the samples `beside_steps`.
     """
     tables, targets = [], []
     for one, drive in zip(y, v, strict=True):
@@ -418,7 +416,7 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = Fal
                 out[k] = play
             rows.append(out)
         behind = max(int(np.argmax(x)), int(np.argmin(x)))
-        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # its start memory is not wiped out in time
+        if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # the record's start memory is wiped too late
             continue
         used = behind + np.flatnonzero(~(without_steps & beside_steps(x)[behind:]))
         part = np.stack(rows)[:, used]
@@ -430,7 +428,7 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = Fal
 
 
 def alike(name: str, x: float) -> list[str]:
-    """Effects that these records cannot tell from effect `name` of strength x: a lag and a delay of a sample or so."""
+    """Effects that these records cannot tell from effect `name` of strength x: a lag and a delay of about a sample."""
     late = ("lag", "delay")
     return [other for other in late if other != name] if name in late and x * LATE < RESOLVED else []
 

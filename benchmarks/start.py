@@ -1,11 +1,11 @@
 """Processor time of `hystgen emit` for a plain model, relative to importing numpy and jinja2, which it needs.
 
-`python benchmarks/start.py --runs 30` runs the two in turn, each in a process of its own, and prints the least and the
-median of both and their ratio, and the modules of hystgen that the command imports. Modules have to be compiled: the
-first run is not counted, and PYTHONDONTWRITEBYTECODE is not passed on.
+`python benchmarks/start.py --runs 30` runs the two in turn, each in a separate process, and prints the minimum and
+median of both, their ratio, and the hystgen modules that the command imports. Since modules must be compiled, the first
+run is not counted, and PYTHONDONTWRITEBYTECODE is not passed on.
 
 `python benchmarks/start.py --first` prints the processor time of `hystgen verify` of ten plays with creep and a lag in
-each arithmetic, first with an empty cache of compiled functions and then with what that run left there.
+each arithmetic, first with an empty cache of compiled functions and then with the cache that this run filled.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ print(*(name for name in sys.modules if name.split(".")[0] == "hystgen"), sep="\
 
 
 def seconds(command: Sequence[str], **more: str) -> float:
-    """Processor time of a process and of those that it waits for, with `more` in its environment."""
+    """Processor time of a process, with `more` in its environment, and of the processes that it waits for."""
     plain = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | more
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=plain)
     _, status, spent = os.wait4(process.pid, 0)
@@ -56,7 +56,7 @@ def seconds(command: Sequence[str], **more: str) -> float:
 
 
 def first_verify() -> None:
-    """Print what the first and the second `verify` take."""
+    """Print the times of the first and the second `verify`."""
     for arithmetic in ("float32", "float64", "q31", "q15"):
         with tempfile.TemporaryDirectory(prefix="hystgen-start-") as name:
             model = Path(name) / "effects.yaml"

@@ -1,12 +1,12 @@
-"""What an unknown start memory costs: held-out errors of fits without a history, over those with the true one.
+"""The cost of an unknown start memory: held-out errors of fits without a history over those with the true history.
 
     python benchmarks/start_memory.py [--seeds A:B] [--drives NAME ...] [--check]
 
-The plants are no play sums (an Everett function with a stack of extremes, and a friction element) and have been
-anywhere in their range before a record; each seed gives another plant. Records swing further and further to both sides,
-from one end, or between random turns, or visit no extreme twice. Held-out loops start from a known memory and stay
-within 70 % of the fitted range (`inside`) or cover all of it (`whole`). Errors are rms with a free offset; before a
-ratio is taken, the noise of the records is added to them, as a user sees them.
+The plants are not play sums (an Everett function with a stack of extremes, and a friction element) and have been
+anywhere in their range before a record; each seed gives a different plant. Records swing further and further to both
+sides, from one end, or between random turns, or visit no extreme twice. Held-out loops start from a known memory and
+stay within 70 % of the fitted range (`inside`) or cover all of it (`whole`). Errors are rms with a free offset; before
+a ratio is taken, the noise of the records is added to both, since a user sees errors with noise.
 
 `bound`: the same ratio for the uncertainty that the records leave to any estimator: the posterior spread of the
 held-out output in a model linear about the truth, with unknown weights and, without a history, an unknown start memory.
@@ -42,12 +42,11 @@ NOISE = 100.0 * NOISE_SHARE
 
 SAMPLES, HELD, LEAD = 600, 800, 400
 """Samples of a record to fit, which is short; of a held-out record, about 70 a leg; and of the drive before a record.
-With 300 or 1200, 400 and 200 instead, no median ratio of seeds 0:8 changes by more than 0.08, and none exceeds
-`COST`."""
+With 300 or 1200, 400, and 200 instead, no median ratio of seeds 0:8 changes by more than 0.08 or exceeds `COST`."""
 
 INSIDE = 0.7
-"""[share of the fitted range] Range of the inner held-out loops: well within the extremes, where an unknown start shows
-most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
+"""[fraction of the fitted range] Range of the inner held-out loops, which stay well within the extremes, where an
+unknown start shows most. With 0.5 instead, no median ratio of seeds 0:8 changes by more than 0.03."""
 
 COST = 1.1
 """[times] The most that an unknown start may cost: a tenth, which a user would hardly notice in a held-out error."""
@@ -60,7 +59,7 @@ SMOOTH = 1.0
 one mean, so from nothing to twice the mean. With 0.3 and 3 instead, the medians of the bound change by at most 0.15."""
 
 FROM_BELOW = (3.0 * HIGH, 0.0)
-"""Drive values after which plays start as the plants do, from the lower end of the range."""
+"""Drive values that start the plays as the plants start, from the lower end of the range."""
 
 
 # Drives, as turns between 0 and 1 ---------------------------------------------------------------------------
@@ -99,7 +98,7 @@ DRIVES: dict[str, Callable[[np.random.Generator], list[float]]] = {
     "both ways": both_ways, "one way": one_way, "walk": growing_walk, "never twice": never_twice,
 }  # fmt: skip
 LOOPS = (-1.0, 1.0, -1.0, 0.3, -0.6, 0.8, -0.2, 1.0, -0.8, 0.5, -1.0, 1.0)
-"""Turns of the held-out loops, with -1 and 1 at the ends of their range."""
+"""Turns of the held-out loops; -1 and 1 are the ends of their range."""
 
 
 def legs(turns: Sequence[float], samples: int) -> Array:
@@ -157,7 +156,7 @@ def fitted(made: Case, history: tuple[float, ...] | None) -> tuple[float, dict[s
     return fit.rows[0].rms, found
 
 
-# What the records leave open --------------------------------------------------------------------------------
+# Uncertainty that the records leave -------------------------------------------------------------------------
 
 
 def open_spread(made: Case, known: bool) -> dict[str, float]:
@@ -182,7 +181,7 @@ def open_spread(made: Case, known: bool) -> dict[str, float]:
         changes = np.empty((len(v), FINE))
         width, small = np.diff(r), 1e-3
         for k, slope_k in enumerate(np.diff(start) / width):
-            way = -small if slope_k > 0.0 else small  # inwards: most slopes are at a bound
+            way = -small if slope_k > 0.0 else small  # inwards, since most slopes are at a bound
             other = start + way * np.where(np.arange(FINE + 1) > k, width[k], 0.0)
             changes[:, k] = (operators.plays(v, r, other).T @ p - plays @ p) / way
         columns = np.column_stack([plays, changes])

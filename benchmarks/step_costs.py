@@ -4,8 +4,8 @@
 
 Records and figures are those of `hystgen verify`: the largest over the builds of zig and gcc, on a Cortex-M0+ without
 and a Cortex-M4F with an FPU. Rows `plays` are models of plays alone, rows `effects` the same with a gain, the cheapest
-effect. Rows of a memoryless part, or of a part of the code of effects, have the instructions that it adds to a model of
-`CODE_PLAYS` plays, and the stack of the whole model. Parts that move or bend plays are measured for one play as well.
+effect. Rows of memoryless parts, and of parts of the effects' code, have the instructions that the part adds to a model
+of `CODE_PLAYS` plays, and the stack of the whole model. Parts that move or bend plays are also measured for one.
 `hystgen.compensator.engines` reads `step_costs.csv` for the banner of emitted files.
 """
 
@@ -28,9 +28,9 @@ from hystgen.compensator.chain.costs import OPERATORS, PER_PLAY
 from hystgen.model import Model
 
 PLAYS = (1, 4, 16, 64)
-"""[plays] Factors of four, between which `engines.dearest` is linear: engine loop costs the same for every play."""
+"""[plays] Factors of four, between which `engines.dearest` is linear: the loop engine costs the same for every play."""
 FEW, MANY = 1, engine_costs.CODE_PLAYS
-"""[plays] The smallest number, and that at which code is measured; parts with a cost per play are measured at both."""
+"""[plays] The smallest number, and the one for which code is measured; parts with a cost per play are run with both."""
 SAMPLES = 300
 """[samples] Length of a record: with 1000, ten plays take at most 2 % more (float32 and q31, both cores)."""
 
@@ -54,7 +54,7 @@ def worst(model: Model, arithmetic: str, engine: str, operator: str = "both") ->
 
 
 def beyond(found: Measured, base: Measured) -> Measured:
-    """The instructions that a model takes beyond those of another one, and its own stack."""
+    """The instructions that a model takes beyond those of another model, and its own stack."""
     cores = len(engines.CORES)
     return {
         op: (*(a - b for a, b in zip(of[:cores], base[op][:cores], strict=True)), *of[cores:])

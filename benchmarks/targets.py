@@ -5,13 +5,13 @@
 
 Emitted code of both engines and operators is compared with the textbook loop (`textbook/textbook.c`: formula (35) as
 ternaries with the same care for NaN, range and status), built by the same compiler with the same flags (-std=c99 -O2)
-and run on the same signal, a decaying multisine over the range. For engine corners a worst case is constructed as well:
-corner lists of every shape, including the deepest, then a sample that gives the next one more to do (`ways`), then
-jumps to all places; neighbours of the most expensive of these; and the same with a NaN, an infinity or a `commit`
+and run on the same signal, a decaying multisine over the range. For the corner engine a worst case is constructed as
+well: corner lists of every shape, including the deepest, then a sample that gives the next one more work (`ways`), then
+jumps to all positions; neighbours of the most expensive of these; and the same with a NaN, an infinity or a `commit`
 before the jump (`interrupted`). A NaN or infinity right after a commit, which repeats the answer before the commit, is
-counted separately. So is a drive range from 0, where the plays rest, as most piezo drives have: there references may
-need a drive below the range, and some fixed sequences, in which rounding decides whether they do, are run as well. All
-counted answers are compared with the bit reference.
+counted separately. So is a drive range that begins at 0, where the plays rest, as with most piezo drives: references
+may then need a drive below the range, and some fixed sequences in which rounding decides that are run as well. All
+answers counted are compared with the bit reference.
 
 Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 if a goal is missed. A run over all plays,
 cores and arithmetics takes hours: `--parts` joins the tables of shorter runs.
@@ -48,22 +48,22 @@ from hystgen.verification import comparison, compilers, cross, emulator, sources
 HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
-SEARCHED = 200_000  # samples of a round of the search for the worst case
-# Trials of at least this many samples are searched separately. `trials` makes 600 of random turns this long; with 4 and
-# 16 plays no other trial has more than 18 samples, with 128 plays corner lists are shorter as well as longer
+SEARCHED = 200_000  # samples per round of the search for the worst case
+# Trials of at least this many samples are searched separately. `trials` makes 600 of them from random turns; with 4 and
+# 16 plays no other trial has more than 18 samples, with 128 plays there are corner lists on either side
 LONG = 100
-# [trials] The next round tries the neighbours of this many of the most expensive trials. For the inverse of 8 plays in
+# [trials] Number of the most expensive trials whose neighbours the next round tries. For the inverse of 8 plays in
 # float32 on a Cortex-M4F 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`): 30 is
 # three times what was needed, for little more time
 KEPT = 30
 RANGE = 10.0  # half of the drive range
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}
-"""More signals, over which the corner engine's mean is taken: a multisine in finer and coarser steps, a random walk."""
+"""Further signals for the corner engine's mean: a multisine in finer and coarser steps, and a random walk."""
 BEHIND = "no number behind a commit"
 FROM_0 = "worst case, range from 0"
-# References for a range from 0, each after a reset to 0, that come within a few units in the last place of the end of a
-# move at the lower limit, so that rounding decides; earlier code solved such moves twice. They are the most expensive
-# of many random sequences, and no corner list of the search leads to them
+# References for a range from 0, each after a reset to 0. They come within a few units in the last place of a move that
+# ends at the lower limit, so rounding decides; earlier code solved such moves twice. They are the most expensive of
+# many random sequences, and no corner list of the search leads to them
 TIES = (
     "18.7375355 5.10948849 10.1918678 2.848948 10.0517645 4.80538797 7.58872414 commit 0.270970821 nan 3.26073146",
     "0.011223905 22.659855 5.7992496 1.043483 8.7496727 4.1068497 3.5384128 4.7950592 3.5384142",
@@ -117,7 +117,7 @@ class Case:
 
     @property
     def in_software(self) -> bool:
-        """Whether floating point is computed by calls, whose cost depends on the numbers."""
+        """Whether floating point is computed by function calls, whose cost depends on the numbers."""
         return self.arithmetic in REALS and not (self.target.fpu and self.arithmetic == "float32")
 
     @property
@@ -139,10 +139,10 @@ def model(n: int, middle: float = 0.0) -> Model:
 
 
 def multisine(samples: int, stride: int = 1) -> Reals:
-    """Decaying multisine as a share of RANGE, every `stride`-th of `samples`.
+    """Decaying multisine as a fraction of RANGE, every `stride`-th of `samples`.
 
     The mean cost of a corner list depends on how finely the drive is sampled, since samples in which another play
-    begins to follow are the expensive ones: with 4000 samples the middle line has 160 a period.
+    begins to follow are the expensive ones: with 4000 samples the middle line has 160 per period.
     """
     t = np.arange(0, samples, stride) / samples
     lines = ((9, 0.6, 0.0), (25, 0.3, 1.0), (41, 0.1, 2.0))
@@ -151,7 +151,7 @@ def multisine(samples: int, stride: int = 1) -> Reals:
 
 
 def walk(samples: int) -> Reals:
-    """Random walk as a share of RANGE: the sine of a sum of normally distributed steps of 0.02 (seed 0).
+    """Random walk as a fraction of RANGE: the sine of a sum of normally distributed steps of 0.02 (seed 0).
 
     Over the range of -10 to 10 a step is about 0.2, and every other one turns. `verify` runs a walk of the same kind.
     """
@@ -167,7 +167,7 @@ def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
 
 
 def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
-    """Inputs of the operator for which the plays see `drive`, measured from the middle of the range.
+    """Inputs of the operator that give the plays the input `drive`, measured from the middle of the range.
 
     In a range from 0, references of the inverse go on beyond the ends of the range with the slope of the first weight.
     """
@@ -194,18 +194,18 @@ def blocks(n: int) -> Iterator[list[int]]:
 
 
 def corner_lists(n: int) -> Iterator[Reals]:
-    """Drives that leave a corner list: swings that take every play along, or rest, then turning points of a shrinking
-    alternating swing, each of which leaves a block behind; all also upside down. No jump can wipe out the whole list
-    that full swings leave, but one can after shorter swings or from rest."""
+    """Drives that leave a corner list: swings that move every play, or rest, then turning points of a shrinking
+    oscillation, each of which leaves a block behind; all also upside down. No jump can wipe out the whole list left by
+    full swings, but one can after shorter swings or from rest."""
     r = np.asarray(model(n).cascade.pi.thresholds)
     for sizes in blocks(n):
         turns = n - np.cumsum(sizes[:-1])
-        swing = np.array([r[k] + r[k + 1] for k in turns])  # moves play k but not the next
+        swing = np.array([r[k] + r[k + 1] for k in turns])  # moves play k but not the next one
         swing[1::2] *= -1
         lists = [np.concatenate([[RANGE, -RANGE], np.cumsum(swing) - RANGE])]
         if len(turns):
             halved = swing.copy()
-            halved[0] /= 2  # from rest a play follows after its threshold, after a turn after twice that
+            halved[0] /= 2  # a play follows after its threshold from rest, after twice its threshold from a turn
             lists.append(np.append(0.0, np.cumsum(halved)))
         short = np.array([1.8 * r[k] + 0.2 * r[k + 1] for k in turns])
         short = short[short < 1.5 * RANGE]
@@ -217,7 +217,7 @@ def corner_lists(n: int) -> Iterator[Reals]:
 
 
 def activations(case: Case, points: Reals) -> Reals:
-    """Drives beyond which a move from the last of `points` takes another play along, by formula (35); ascending."""
+    """Drives beyond which a move from the last of `points` moves another play, by formula (35); ascending."""
     r = np.asarray(model(case.n).cascade.pi.thresholds)[1:]
     plays = np.full(case.n, -case.middle)
     for x in np.clip(points, -RANGE, RANGE):
@@ -231,28 +231,28 @@ def thinned(x: Reals, most: int) -> Reals:
 
 
 def landings(case: Case, points: Reals, most: int = 129) -> Reals:
-    """Drives that take different plays along from the last of `points` on; the outermost lie beyond the range."""
+    """Drives to which moves from the last of `points` move different plays; the outermost lie beyond the range."""
     ends = RANGE * np.array([-1.01, 1.01, *([-1.1, -1.5] if case.middle else [])])
     between = np.unique(np.concatenate([ends[:2], np.clip(activations(case, points), -RANGE, RANGE)]))
     return np.concatenate([ends, thinned((between[1:] + between[:-1]) / 2, most - len(ends))])
 
 
 def trials(case: Case) -> Iterator[Reals]:
-    """Every corner list followed by a jump: the search for its end is the work of a sample."""
-    # first uneven blocks, which no rule makes: random turning points, small among large, few and many
+    """Every corner list followed by a jump: the search for the jump's end is a sample's work."""
+    # first uneven blocks, which no rule makes, from random turning points, small among large, few and many
     rng = np.random.default_rng(11)
     for size in [*rng.integers(4, 12, 2000), *[LONG] * 600]:
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
         if size < LONG:
             yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
-        yield turns  # and from the start
+        yield turns  # and without full swings
     for points in corner_lists(case.n):
         for jump in landings(case, points, 2000 // case.n + 20):
             yield np.append(points, jump)
 
 
 def ways(case: Case, points: Reals, hair: float) -> Iterator[Reals]:
-    """Steps on from `points` after which the next sample has more to do before its own search.
+    """Further steps from `points` after which the next sample has more work before its own search.
 
     A sample is fast if the previous one ended where its search had led. That fails if the previous one went back to the
     corner it came from, with no play following in between; if it asked for less than a `hair`, the finest step of the
@@ -274,7 +274,7 @@ def ways(case: Case, points: Reals, hair: float) -> Iterator[Reals]:
 
 
 def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """A trial with one of the `ways` before its jump, which then leads to several places."""
+    """A trial with one of the `ways` before its jump, for several ends of the jump."""
     for way in ways(case, trial[:-1], hair):
         points = np.concatenate([trial[:-1], way])
         for jump in landings(case, points, 9):
@@ -282,9 +282,8 @@ def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
 
 
 def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """Variants of a trial: its end, which may be all that matters; slightly different numbers, on which the cost of
-    software floating point depends; another end of its last jump, or another point shortly before; and the `longer`
-    ones."""
+    """Variants of a trial: its last points alone, which may be all that matters; slightly different numbers, on which
+    the cost of software floating point depends; another of its last points; and the `longer` trials."""
     for length in (4, 8, 16, 32, 64):
         if length < len(trial):
             yield trial[-length:]
@@ -300,12 +299,12 @@ def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
 
 
 def alternating(found: Sequence[Iterable[Reals]]) -> Iterator[Reals]:
-    """The first of each, then the second of each, and so on."""
+    """The first item of each, then the second of each, and so on."""
     return (x for row in itertools.zip_longest(*found) for x in row if x is not None)
 
 
 def within(most: int, found: Iterable[Reals]) -> list[Reals]:
-    """The first trials, with at most `most` samples together."""
+    """The first trials, with at most `most` samples in total."""
     kept = []
     for trial in found:
         most -= len(trial) + 1
@@ -328,7 +327,7 @@ def lsbs(case: Case) -> tuple[float, float]:
 
 
 def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
-    """Inputs of the operator for which the plays see `drive`, in its arithmetic; codes are `coarser` times the
+    """Inputs of the operator, in its arithmetic, that give plays the input `drive`; codes are `coarser` times the
     finest."""
     x = from_drive(case, drive, call)
     real = ARITHMETICS[case.arithmetic].number
@@ -347,7 +346,7 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
     step on from there.
     """
     odd = [np.nan, np.inf, -np.inf] if ARITHMETICS[case.arithmetic].number.kind == "f" else []
-    paths: list[Reals] = []  # drives that the plays see, from which the references of the inverse follow
+    paths: list[Reals] = []  # drives at the plays, from which the references of the inverse follow
     for trial in found:
         paths += [trial, np.append(trial[:-2], trial[-1])]
         paths += [np.append(trial, on) for on in (trial[-2], -trial[-1])]
@@ -392,7 +391,7 @@ def ties() -> tuple[Any, Any]:
 
 
 def behind_commit(call: Any, x: Any) -> Any:
-    """Which operations are steps of a NaN or infinity right after a commit."""
+    """Whether each operation is a step to a NaN or infinity right after a commit."""
     return (call == slots.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == slots.OP_COMMIT)
 
 
@@ -403,11 +402,11 @@ def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
 
 
 Form = Callable[[Case, Sequence[Reals]], tuple[Any, Any, list[int]]]
-"""Makes operations, arguments and the end of each trial from trials."""
+"""Function that makes operations, arguments and the end of each trial from trials."""
 
 
 class Bench:
-    """Builds, runs and counts in a folder of its own; remembers the worst trials found."""
+    """Builds, runs and counts in its own folder; remembers the worst trials found."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -433,7 +432,7 @@ class Bench:
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
-        """The loop with its tables; in fixed point codes are twice as coarse, so that sums of two fit."""
+        """The loop with its tables; in fixed point, codes are twice as coarse, so that the sum of two fits."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
         cascade = case.model.cascade
@@ -445,7 +444,7 @@ class Bench:
         if case.arithmetic in ("q31", "q15"):
             drive, output = (2 * lsb for lsb in lsbs(case))
             into, out = (drive, output) if forward else (output, drive)
-            # bits of the sum, less a sign, less those of a number, less those of the steepest gain
+            # bits of the sum without its sign, minus those of a number and those of the steepest gain
             gain = sum(abs(p) for p in pi.weights) * into / out
             fraction = (62 if case.arithmetic == "q31" else 30) - (30 if case.arithmetic == "q31" else 14)
             fraction -= max(0, math.ceil(math.log2(gain))) + 1
@@ -493,8 +492,8 @@ class Bench:
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
     def worst(self, case: Case) -> list[Figures]:
-        """Engine corners over the worst trials; separately, if there are any, NaN or infinity right after a commit, and
-        calls of `commit`."""
+        """The corner engine over the worst trials; separately, if there are any, a NaN or infinity right after a
+        commit, and calls of `commit`."""
         image = self.image(case, "corners")
         stack = 0
         steps, returns, calls = [], [], []
@@ -534,7 +533,7 @@ class Bench:
         call: Any = None,
         counted: str = "step",
     ) -> emulator.Core:
-        """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
+        """A core after the steps `x`, or the operations `call`, with answers already compared with the reference."""
         numbers = case.model.tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), slots.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = ARITHMETICS[case.arithmetic].number
@@ -547,7 +546,7 @@ class Bench:
 
     def _worst_trials(self, case: Case) -> list[Reals]:
         """The trials with the most expensive samples on a Cortex-M4F or, for cores without FPU, on a Cortex-M0+; other
-        cores differ little. Constructed trials come first, then neighbours of the most expensive ones."""
+        cores differ little. Constructed trials come first, then neighbours of the most expensive."""
         case = self._searched(case)
         if case not in self._worst:
             real = ARITHMETICS[case.arithmetic].number
@@ -559,7 +558,7 @@ class Bench:
                 found = within(SEARCHED // (1 + (most < SEARCHED)), trials(case))
                 classes = [[x for x in found if (len(x) < LONG) == short] for short in (True, False)]
             self._worst[case] = []
-            for found in classes:  # separately: the most expensive long ones would crowd out the short ones
+            for found in classes:  # separately, as the most expensive long trials would crowd out short ones
                 if rounds > 1:
                     _, found = self._dearest(case, found, 20)
                     found += within(most, alternating([longer(case, trial, hair) for trial in found]))
@@ -567,13 +566,13 @@ class Bench:
         return self._worst[case]
 
     def _worst_interrupted(self, case: Case, behind: bool) -> list[Reals]:
-        """The same for interrupted trials, among them the worst uninterrupted ones; `behind`: ranked by a NaN or
+        """The same for interrupted trials, including the worst uninterrupted ones; `behind`: ranked by a NaN or
         infinity right after a commit, otherwise by all other samples."""
         case = self._searched(case)
         if (case, behind) not in self._worst_odd:
             real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
-            most = self._most(case) // 8  # each has several forms
+            most = self._most(case) // 8  # each trial has several forms
             best = list(self._worst_trials(case))
             if case.arithmetic == "float64":
                 best += self._worst_interrupted(replace(case, arithmetic="float32"), behind)
@@ -590,13 +589,13 @@ class Bench:
 
     @staticmethod
     def _most(case: Case) -> int:
-        """Samples of a round of the search: fewer where floating point is computed in software."""
+        """Samples per round of the search: fewer if floating point is computed in software."""
         return SEARCHED // (2 if case.in_software else 1)
 
     def _better(
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
     ) -> list[Reals]:
-        """The most expensive of the trials and their neighbours, searched while the neighbours are more expensive."""
+        """The most expensive of the trials and their neighbours, searched while neighbours are more expensive."""
         before, (dear, best) = 0, self._dearest(case, best, KEPT, form, behind)
         for _ in range(rounds):
             if dear == before:
@@ -609,7 +608,7 @@ class Bench:
         self, case: Case, found: list[Reals], number: int, form: Form = plain, behind: bool = False
     ) -> tuple[int, list[Reals]]:
         """Instructions of the most expensive sample, and the `number` most expensive trials, the worst first; of trials
-        that jump from the same place only one is kept."""
+        that jump from the same points, only one is kept."""
         call, x, ends = form(case, found)
         counts = np.zeros(len(call))
         counts[call == slots.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
@@ -657,7 +656,7 @@ def measure(
     arithmetics: Sequence[str],
     samples: int,
 ) -> list[Figures]:
-    """Figures of all combinations; compilers that are not installed are left out with a message."""
+    """Figures of all combinations; compilers that are not installed are skipped with a message."""
     found: list[Figures] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-bench-") as folder:
         bench = Bench(Path(folder))
@@ -669,7 +668,7 @@ def measure(
                 continue
             for n, arithmetic in itertools.product(plays, arithmetics):
                 began = time.monotonic()
-                # A loop visits every play in every sample: fewer samples give the same figure sooner
+                # The loop visits every play in every sample: fewer samples give the same figure sooner
                 all_of_it = RANGE * multisine(samples)
                 some = all_of_it if target.fpu else RANGE * multisine(samples, stride=max(1, min(n, samples // 100)))
                 for operator in ("forward", "inverse"):
@@ -775,7 +774,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
     import matplotlib as mpl
 
     mpl.use("Agg")
-    mpl.rcParams["svg.hashsalt"] = "hystgen"  # the same file from the same figures
+    mpl.rcParams["svg.hashsalt"] = "hystgen"  # so that equal figures give equal files
     import matplotlib.pyplot as plt
 
     names, plays = list(dict.fromkeys(f.target for f in figures)), sorted({f.n for f in figures})

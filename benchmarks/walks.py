@@ -2,9 +2,9 @@
 
     python benchmarks/walks.py [-v]
 
-For each run it prints the number of files of the package in which a function was entered, and of doorways, pairs of
-files of which one calls the other; with -v also the files. Imports do not count, nor does a first run, which fills
-caches, nor do other processes. A profiler sees no compiled functions, so the bit reference runs as plain Python.
+For each run it prints the number of files of the package in which a function was called, and of doorways, pairs of
+files of which one calls the other; with -v also the files. Imports, a first run, which fills caches, and other
+processes do not count. A profiler sees no compiled functions, so the bit reference runs as plain Python.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ model:
 
 @functools.cache
 def inside(file: str) -> str | None:
-    """The path of a file within the package, None for others; cached, since a walk asks at every call."""
+    """The path of a file within the package, None for other files; cached, since a walk asks at every call."""
     path = Path(file)
     return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else None
 
@@ -61,7 +61,7 @@ def walk(run: Callable[[], object]) -> tuple[list[str], int]:
             return
         files.add(here)
         caller = frame.f_back
-        while caller is not None and place(caller) is None:  # through a library, such as a decorator's
+        while caller is not None and place(caller) is None:  # through a library, for example a decorator
             caller = caller.f_back
         before = place(caller)
         if before not in (None, here):
@@ -77,7 +77,7 @@ def walk(run: Callable[[], object]) -> tuple[list[str], int]:
 
 
 def crept(model: hystgen.Model, path: Path) -> None:
-    """Write a recording of steps in which the model's output creeps by 3 % with a time constant of 2 s."""
+    """Write a recording of steps after which the model's output creeps by 3 % with a time constant of 2 s."""
     t = 0.05 * np.arange(2000)
     v = 3.5 * np.repeat(np.random.default_rng(1).uniform(-1.0, 1.0, 50), 40)
     h = model.simulate(v)
@@ -99,7 +99,7 @@ def runs(folder: Path) -> dict[str, Callable[[], object]]:
     session = model.session("inverse", "float32")
 
     def named() -> None:
-        if hasattr(os, "sched_setaffinity"):  # one core: no other processes
+        if hasattr(os, "sched_setaffinity"):  # on one core there are no other processes
             os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
         found = hystgen.diagnose(model, [recording])
         assert [each.name for each in found.parameters.model.effects] == ["creep"], found.sentence()
@@ -113,7 +113,7 @@ def runs(folder: Path) -> dict[str, Callable[[], object]]:
 
 
 def main() -> int:
-    """Print the table; each walk in a process of its own."""
+    """Print the table; each walk runs in a separate process."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-v", "--verbose", action="store_true", help="list the files")
     parser.add_argument("--one", help=argparse.SUPPRESS)

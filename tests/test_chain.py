@@ -64,7 +64,7 @@ def compiled(one: Model, arithmetic: str) -> tables.Compiled:
 
 
 def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> Run:
-    """A smooth reference with plateaus, over a share of the output range, at speeds that bounds hold for."""
+    """A smooth reference with plateaus, over a fraction of the output range, at rates for which the bounds hold."""
     rng = np.random.default_rng(seed)
     low, high = (float(end) for end in one.tables.limits.output[0])
     still = rng.random(n) < 0.2
@@ -81,7 +81,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
     """Records are short; `test_mutants.py` compiles the reference and runs long ones.
 
-    Each model runs in one arithmetic, with HYSTGEN_WHOLE=1 in all four."""
+    Each model runs in one arithmetic; with HYSTGEN_WHOLE=1, in all four."""
     how = {"compiler": ["gcc"], "length": 30 if brief else 200}
     with jit.plain():
         report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", **how)
@@ -100,7 +100,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bo
      ("rubbed", "float32"), ("rubbed", "q15")],
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str, core: str) -> None:
-    """Each model runs on one core, and each core with at least two models; HYSTGEN_WHOLE=1 runs all on all."""
+    """Each model runs on one core, each core runs at least two models; HYSTGEN_WHOLE=1 runs all models on all cores."""
     with jit.plain():
         report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", targets=[core], target_length=150)
     assert report.ok, report.table()
@@ -132,8 +132,8 @@ def test_cores_give_the_bits_of_a_drive_at_rest(name: str, arithmetic: str) -> N
 LAG = "name: lag, time_constant: 0.01"
 FAST = "name: creep, time_constants: [0.004, 0.015, 0.03], weights: [0.02, 0.03, 0.05]"
 SETTLED = {"q31": 700}
-"""[samples] Time until a drive has settled, 400 if not listed: ten times the slowest of these time constants, and 100.
-In q31 it takes twenty times until the tail of the lead is less than a code of 2^32."""
+"""[samples] Time until a drive has settled, 400 if not listed: ten times the slowest of these time constants, plus 100.
+In q31 it takes twenty time constants until the tail of the lead is less than one code of 2^32."""
 QUIETED = {
     "lag": chain("lag", LAG),
     "lag_and_creep": chain("lag_and_creep", LAG, FAST, front=TANH),
@@ -148,8 +148,8 @@ QUIETED = {
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", QUIETED)
 def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
-    """After a move down and one up only creep moves the drive, in a direction that changes at most once; without creep
-    it stands still. The displacement, by the model in double precision, is as close as the kept drive allows."""
+    """After a move down and one up only creep moves the drive, reversing at most once; without creep it stands still.
+    The displacement, from the model in double precision, is as close as the held drive allows."""
     rng = np.random.default_rng([len(name), len(arithmetic)])
     one = model(name, QUIETED[name] + "emit: {compensation: {quiet: true}}\n")
     numbers = tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
@@ -170,7 +170,7 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
     error = np.abs(one.simulate(v * drive, t=t) / output - u)
     kept = 2.0 * unit * float(numbers.tables.number.dither[0]) + 0.5 * drive * (numbers.codes is not None)
     allowed = 1.1 * one.cascade.pi.slopes[-1] * one.cascade.front_slopes[1] * kept / output  # creep adds 10 %
-    allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # between two samples
+    allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # interpolation error
     for end in (120 + held, len(u)):
         still = slice(end - 100, end - numbers.ahead)
         way = np.sign(np.diff(v[still]))
@@ -185,7 +185,7 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
 
 
 def test_a_quiet_drive_moves_when_the_reference_does() -> None:
-    """If the reference moves by a code or the offset jumps while the drive stands still, the lag is led at once."""
+    """If the reference moves by a code or the offset jumps while the drive rests, the lag is compensated at once."""
     one = model("lag", QUIETED["lag"] + "emit: {compensation: {quiet: true}}\n")
     numbers = tables.build(one.chain, "q15", T, one.parameters.emit.compensation)
     step, offset = slots.OP_STEP, slots.OP_OFFSET
@@ -203,7 +203,7 @@ def test_a_quiet_drive_moves_when_the_reference_does() -> None:
 
 @pytest.mark.parametrize(("lsb", "changes"), [(8.0 / 4095.0, False), (None, True)])
 def test_a_quiet_drive_knows_the_step_of_a_converter(lsb: float | None, changes: bool) -> None:
-    """In floating point the firmware commits each drive as rounded by a 12-bit converter."""
+    """In floating point, the firmware commits each drive as a 12-bit converter rounds it."""
     one = model("lag_and_creep", QUIETED["lag_and_creep"] + "emit: {compensation: {quiet: true}}\n")
     t = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None)).tables
     code, state = reference.operations(t, True), reference.new_state(t, True)
@@ -228,8 +228,8 @@ def test_two_branches_are_not_quiet() -> None:
 EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {
     "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
-"""[share of the output range] Largest error. For viscous plays it comes from contacts inside a step; for dashpots from
-the place in a step where the input counts as standing still, which matters if plays catch up within the step."""
+"""[fraction of the output range] Largest error. For viscous plays it is due to contacts inside a step; for dashpots, to
+where in a step the input counts as standing still, which matters if plays catch up within the step."""
 
 
 @pytest.mark.slow(one_in=3)
@@ -237,7 +237,7 @@ the place in a step where the input counts as standing still, which matters if p
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:
-    """Exact at every sample without a limit. Each model runs with one seed, with HYSTGEN_WHOLE=1 with all three."""
+    """Exact wherever the drive is not limited. Each model runs with one seed; with HYSTGEN_WHOLE=1, with all three."""
     one = model(name)
     numbers = compiled(one, "float64")
     run = record(numbers, seed, share=0.6)
@@ -263,7 +263,7 @@ def test_an_inverse_simulated_twice_begins_at_the_start_memory_both_times(name: 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
-    """A step over half the range, up and down, with the model in double precision as the actuator."""
+    """The reference steps over half the range, up and down; the actuator is the model in double precision."""
     lag, slew = "name: lag, time_constant: 0.01", "name: slew_limit, rate: 700, falling_rate: 400"
     one = model("braked", chain("braked", lag, slew))
     numbers = compiled(one, arithmetic)
@@ -314,7 +314,7 @@ def test_a_held_sample_stays_within_the_slew_limit(text: str, arithmetic: str) -
 
 @pytest.mark.parametrize("name", ["late", "straight", "everything"])
 def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
-    """The drive jumps and holds, which makes a mode ring longest."""
+    """The drive jumps and holds, which makes a mode ring the longest."""
     one = model(name, CHAINS[name].replace(BRANCHES, "").replace("rate: 3000", "rate: 30000"))
     low, high = one.cascade.input_range
     v = np.repeat(np.random.default_rng(4).uniform(0.3 * low, 0.3 * high, 4), 60)
@@ -342,7 +342,7 @@ def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
 
 @pytest.mark.parametrize(("frequency", "damping"), [(0.5, 0.3), (30.0, 0.05), (333.0, 1.0), (700.0, 0.01), (5.0, 4.0)])
 def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: float) -> None:
-    """The sums of absolute responses used in bounds equal those of the recursion sample by sample."""
+    """The sums of absolute responses used in bounds equal those of the sample-by-sample recursion."""
     effect = Resonance(name="resonance", frequency=frequency, damping=damping)
     one = resonance.numbers(effect, T)
     keep, turn, swing, lead, push = one.table
@@ -350,7 +350,7 @@ def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: 
     n = 40_000
 
     def responses(state: Any, change: float = 0.0) -> tuple[float, float]:
-        """Sums of the absolute output and rate, with a pulse of the input at the first sample."""
+        """Sums of the absolute output and rate after an input pulse at the first sample."""
         state = np.array(state) + change * np.array([lead, push])
         total, rates = abs(change + state[0]), abs(state[1])
         for k in range(n):
@@ -364,7 +364,7 @@ def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: 
 
 
 def test_drift_is_compensated_ahead_of_time() -> None:
-    """References are whole samples ahead of the motion, and the drift goes on meanwhile."""
+    """References are whole samples ahead of the motion, while the drift continues."""
     text = chain("ahead", "name: drift, rate: -0.08", "name: delay, time: 3.0e-3", CREEP, compensate="drift")
     one = model("ahead", text)
     numbers = compiled(one, "float64")
@@ -440,7 +440,7 @@ def test_own_heat_leaves_the_gain_of_one_sample() -> None:
 
 
 def test_heat_of_loops_leaves_the_gain_of_one_sample_and_what_few_plays_miss() -> None:
-    """The model has all rubbing plays. The drive alternates between large loops and small ones at changing places."""
+    """The model has all rubbing plays. The drive alternates between large loops and small loops whose centre moves."""
     one = model("rubbed")
     heat = one.effects[0]
     assert isinstance(heat, HysteresisHeating)
@@ -462,7 +462,7 @@ def test_heat_of_loops_leaves_the_gain_of_one_sample_and_what_few_plays_miss() -
 
 
 def test_few_plays_warm_like_many() -> None:
-    """Eight plays against 4000, for drives of all kinds, including the loops that eight plays resolve least."""
+    """Eight plays are compared with 4000 for drives of all kinds, including loops that eight plays resolve worst."""
     reach, seconds, ends, move = 3.0, T, (-4.0, 4.0), 0.25
     heat = HysteresisHeating(name="thermal", source="hysteresis", time_constant=2.0, heating=0.05, reach=reach)
     allowed = thermal.coarseness(heat, ends, move, seconds)
@@ -530,7 +530,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["led", "wider"])
 def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str, arithmetic: str) -> None:
-    """With other smooth references with plateaus, the error is within a factor of ten of the stated one."""
+    """For other smooth references with plateaus, the error is at most ten times the stated one."""
     one = model(name, {**CHAINS, **LED}[name])
     how = one.parameters.emit.compensation
     numbers, ends = compiled(one, arithmetic), one.cascade.input_range
@@ -549,7 +549,7 @@ def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str
 
 @pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> None:
-    """float32 is within its bound of float64 to which the drives of float32 are committed; no more is promised here."""
+    """float32 stays within its bound of float64 tables to which its drives are committed; no more is promised here."""
     one = model(name, CHAINS[name].replace(BRANCHES, ""))
     numbers, double = compiled(one, "float32"), compiled(one, "float64")
     bound = bounds.chain_bounds(numbers, "float32")
@@ -573,7 +573,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> No
 
 @pytest.mark.thorough
 def test_slow_states_neither_stall_nor_drift() -> None:
-    """With tau/T = 2^28 the state after a step of the drive goes where it would go without rounding."""
+    """With tau/T = 2^28, the state after a step of the drive moves as far as it would without rounding."""
     seconds, tau = 1e-3, 2.0**28 * 1e-3
     text = chain("slow", f"name: creep, time_constants: [{tau}], weights: [0.1]")
     one = model("slow", text)
@@ -591,7 +591,7 @@ def test_slow_states_neither_stall_nor_drift() -> None:
 
 @pytest.mark.thorough
 def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding() -> None:
-    """The drive stands still for 1e6 samples; in single precision the last moves are 1e-4 of the last bit."""
+    """The drive stands still for 1e6 samples; in single precision, the last moves are 1e-4 of the last bit."""
     one = model("dashpot")
     n = 1_000_000
     calls = np.full(n, slots.OP_STEP, dtype=np.uint8)
@@ -633,7 +633,7 @@ def run_calls(one: Model, calls: list[tuple[int, float]], arithmetic: str = "flo
 
 
 def test_commits_and_holds_leave_no_trace() -> None:
-    """Whatever was applied, the next reference is reached."""
+    """The next reference is reached whatever was applied before."""
     one = model("creeping")
     rng = np.random.default_rng(3)
     u = 3.0 * np.sin(0.02 * np.arange(800))
@@ -670,7 +670,7 @@ def test_settle_and_reset_start_at_rest() -> None:
 def test_a_sensor_trims_the_offset_and_settings_are_limited() -> None:
     one = model("creeping")
     calls = []
-    for _ in range(200):  # the plant lies 0.7 above the model
+    for _ in range(200):  # the plant's output is 0.7 above the model's
         calls += [(slots.OP_STEP, 1.0), (slots.OP_EXPECTED, 0.0)]
     answer, _ = run_calls(one, calls)
     offset = 0.0
@@ -702,7 +702,7 @@ def test_a_temperature_is_compensated_from_the_next_step_on() -> None:
 
 
 def test_preview_reads_ahead_what_is_late() -> None:
-    """A delay of 2.6 samples and a mode need references four samples ahead, with weights that sum to 1."""
+    """With a delay of 2.6 samples and a mode, references are read four samples ahead, with weights that sum to 1."""
     numbers = compiled(model("late"), "float64")
     assert numbers.ahead == 4
     assert numbers.taps is not None
@@ -729,7 +729,7 @@ def header(one: Model, macro: str) -> str:
 
 
 def test_noise_gain_is_that_of_an_impulse() -> None:
-    """Without plays all is linear: the gain is the peak spectrum of the impulse response over the gain at rest."""
+    """Without plays all is linear: the gain is the peak of the impulse response's spectrum over the static gain."""
     one = model("straight")
     numbers = compiled(one, "float64")
     n = 1 << 15
@@ -737,7 +737,7 @@ def test_noise_gain_is_that_of_an_impulse() -> None:
     u[200] += 1e-3
     x = answers(numbers, Run(np.arange(n) * T, u, {}), True)
     gain = np.abs(np.fft.rfft(x - x[0])) / 1e-3
-    rest = 1.0 / (2.0 * 1.1)  # weight 2, and creep of 10 % in the end
+    rest = 1.0 / (2.0 * 1.1)  # weight 2, and finally 10 % creep
     assert numbers.noise_gain == pytest.approx(float(np.max(gain)) / rest, rel=1e-4)
     assert numbers.noise_gain > 50.0
     assert float(header(one, "NOISE_GAIN").rstrip("f")) == pytest.approx(numbers.noise_gain, rel=1e-6)
@@ -782,7 +782,7 @@ MODES = [(20.0, 1e-3), (20.0, 0.02), (77.0, 0.1), (150.0, 0.3), (310.0, 0.05), (
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 @pytest.mark.parametrize(("frequency", "damping"), MODES)
 def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: preview.By) -> None:
-    """With a drive that is straight between samples, scipy's mode is at rest once the last weight has acted."""
+    """For a drive that is linear between samples, scipy's mode is at rest once the last weight has acted."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by=by)
     w0 = 2.0 * np.pi * frequency
@@ -801,8 +801,8 @@ def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: previ
 
 @pytest.mark.parametrize(("frequency", "damping"), MODES[:3])
 def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: float) -> None:
-    """Against the recursion with the pole `exp(-w0 T)` twice: the mean delay is longer by at most part of a sample, the
-    gain at half the sample rate is no higher, and when the averages end the poles still miss over 5 % of a step."""
+    """Compared with a double pole `exp(-w0 T)`, the mean delay is longer by at most part of a sample, the gain at half
+    the sample rate is no higher, and the averages end while the poles still miss over 5 % of a step."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by="notch")
     pole = math.exp(-2.0 * math.pi * frequency * T)
@@ -819,7 +819,7 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
 
 @pytest.mark.parametrize(("by", "left"), [("shaper", 0.147), ("notch", 0.135)])
 def test_a_mode_that_is_not_as_identified_rings(by: preview.By, left: float) -> None:
-    """A mode 10 % too low rings by the share of a step that the docs state, and one 10 % too high by no more."""
+    """A mode 10 % too low rings by the fraction of a step that the docs state, and a mode 10 % too high by no more."""
     found = preview.taps(0.0, [Resonance(name="resonance", frequency=20.0, damping=0.02)], 1e-4, by=by)
     v = np.concatenate([[0.0], np.cumsum(found.weights[::-1]), np.ones(1500)])
     rings = []
@@ -854,7 +854,7 @@ def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
 
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 def test_what_shapes_says_how_late_it_is(by: str) -> None:
-    """The stated delay and error agree with the motion of the stage on a ramp and on a sine."""
+    """The stated delay and error agree with the stage's motion along a ramp and a sine."""
     one = with_options("straight", resonance=by)
     how = one.parameters.emit.compensation
     numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
@@ -907,7 +907,7 @@ def test_a_front_that_may_be_the_sensor_s_is_emitted_with_a_warning(
 
 @pytest.mark.parametrize("name", ["aged", "warm", "late", "drifting", "everything"])
 def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
-    """It calls each setting, and one with a value beyond its limits."""
+    """The self-test calls each setting, and one with a value beyond its limits."""
     one = model(name)
     text = emitted_files(one, operator=operator(name))
     calls = set(re.findall(rf"{name}_inverse_(push|settle|set_\w+)\(", text[f"{name}.h"]))
@@ -916,7 +916,7 @@ def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
     samples = text[f"{name}_selftest.c"].partition("_selftest_inverse[")[2].partition("};")[0]
     counts = Counter(re.findall(r"{'(\w)'", samples))
     assert all(counts[letter] >= 1 for letter in tested)
-    # only settings set this bit, but a later call may be the first to read it
+    # only settings set this bit, but a later call may be the first to report it
     assert any(int(status) & slots.LIMITED_SETTING for status in re.findall(r", (\d+)u}", samples))
 
 
@@ -936,7 +936,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """Checked with the cheaper engine, then with engine loop."""
+    """Memory is checked with the cheaper engine, then with the loop engine."""
     one = noisy(name)
     for engine in dict.fromkeys([one.engine("auto", operator(name), arithmetic), "loop"]):
         memory_is_that_of_the_compiler(one, arithmetic, engine, tmp_path / engine)
@@ -1030,7 +1030,7 @@ def test_simulate_in_an_arithmetic_takes_even_times() -> None:
 
 @pytest.mark.thorough
 def test_a_constant_reference_stays_within_the_bound() -> None:
-    """10^6 samples at rest after a move; the slowest time constant is a third of that."""
+    """The reference rests for 10^6 samples after a move; the slowest time constant is a third of that."""
     one = model("creeping")
     numbers, double = compiled(one, "float32"), compiled(one, "float64")
     n = 1_000_000

@@ -98,7 +98,7 @@ def diagnosed_once(case: Path) -> dict[str, Any]:
 class TestBlindPlants:
     @pytest.mark.thorough
     def test_single_effects(self, singles: list[tuple[Path, dict[str, Any]]]) -> None:
-        """In a small sample most effects are named, first and alone, and the gap shrinks."""
+        """In a small sample, most effects are named, first and alone, and the gap shrinks."""
         right, alone, wrong = 0, 0, []
         for case, label in singles:
             content = diagnosed_once(case)
@@ -113,7 +113,7 @@ class TestBlindPlants:
                 (effect,) = content["effects"]
                 before, after = effect["holdout_before"], effect["holdout_after"]
                 share, gap = effect["share_of_gap"], content["gap"]["refitted"]["holdout"]
-                half = 5e-8  # all four numbers are given to eight digits
+                half = 5e-8  # all four numbers have eight digits
                 assert abs(share * gap - (before - after)) <= half * (2.0 * share * gap + before + after)
                 assert after == content["gap"]["after"]["holdout"]
         assert right >= SINGLES - 1, wrong
@@ -165,7 +165,7 @@ class TestBlindPlants:
         assert shown.count("<img src=\"data:image/svg+xml;base64,") == 6
         assert "http" not in re.sub(r"base64,[^\"]*", "", shown)
         assert all(name in shown for name in names)
-        # What the report says about C agrees with emit
+        # The report's statement about C agrees with emit
         emitted = run("emit", tmp_path / "out" / "params.yaml", "-o", tmp_path / "fw", "--list-outputs")
         page = html.unescape(re.sub(r"\s+", " ", shown))
         reason = " ".join(emitted[2].split("error: ", 1)[-1].split())
@@ -189,7 +189,7 @@ class TestSeveralProcesses:
     def test_they_find_the_same(
         self, singles: list[tuple[Path, dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """One process finds the same as several; on a machine with one core, three find the same as one."""
+        """One process finds the same as several; with one core, three processes find the same as one."""
         case, _ = singles[0]
         found = diagnosed_once(case)
         cores = parallel.cores()
@@ -224,8 +224,8 @@ class TestSeveralProcesses:
 
 @pytest.mark.data
 def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
-    """Fitted on the sine and judged on the fades, the error is at most half a percent of the range and the amplifier's
-    lag is named. It shows only together with a second effect: alone, creep explains more."""
+    """With the sine fitted and the fades held out, the error is at most half a percent of the range and the amplifier's
+    lag is named. The lag shows only together with a second effect: alone, creep explains more."""
     sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
     fades = part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300)
     hystgen.identify(sine).write(tmp_path / "stage.yaml")
@@ -239,7 +239,7 @@ def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
 
 @pytest.mark.data
 def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
-    """With the start-up transient in both records a delay explains as much as the lag, so both are named."""
+    """With the start-up transient in both records, a delay explains as much as the lag, so both are named."""
     sine = measured / "p885_sine_1hz.csv"
     hystgen.identify(sine).write(tmp_path / "stage.yaml")
     content = hystgen.diagnose(tmp_path / "stage.yaml", sine, holdout=measured / "p885_fades_and_hold.csv").content
@@ -250,7 +250,7 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
 
 @pytest.mark.data
 def test_flexure_stage_with_more_records(measured: Path, tmp_path: Path) -> None:
-    """The larger loops show a non-congruence that the end of the fades hardly shows; it is named nevertheless."""
+    """The larger loops show a non-congruence that hardly shows at the end of the fades; it is still named."""
     sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
     fades = read_record(part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300))
     half = len(fades) // 2
@@ -265,7 +265,7 @@ def test_flexure_stage_with_more_records(measured: Path, tmp_path: Path) -> None
 
 
 def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
-    """The sentence states which effects could be others, and an error far above the noise."""
+    """The sentence states which effects could be other ones, and an error far above the noise."""
     parameters = hystgen.load(_model(tmp_path)).parameters
     rivals = [("lag", "delay"), ("lag", "resonance")]
     said = "Missing: lag (or delay or resonance), creep. The held-out rms error falls from 0.5 um to 0.05 um"
@@ -282,7 +282,7 @@ def figures_of(said: str) -> list[float]:
 @pytest.mark.parametrize(("held", "fitted"), [(0.05, 0.03), (0.3, 0.04), (0.03, 0.45), (0.9, 0.9)])
 @pytest.mark.parametrize("why", ["range", "most", "above"])
 def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, held: float, fitted: float) -> None:
-    """For gaps of 50 and 40 times the noise of 0.02 um, shares from 3 to 90 % are stated and not judged."""
+    """For gaps of 50 and 40 times the noise of 0.02 um, remainders from 3 to 90 % are stated but not judged."""
     of_held, of_fitted = selection.Explained(1.0, held, 0.02), selection.Explained(0.8, fitted, 0.02)
     refused = selection.Refusal(why, *{"range": (0.31, 0.105), "most": (held, 1.0), "above": (held, 0.04)}[why])
     end = ranges.End(0, "creep", AtEnd("weights 2", 3.0, "largest", 3.0, 9.0, 1.25 * held, "no less"))
@@ -313,7 +313,7 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
     ],
 )
 def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
-    """0.07 um of 0.5 um is left, with noise of 0.02 um. If no number of creep is at an end, two times are equal."""
+    """Of 0.5 um, 0.07 um remain; the noise is 0.02 um. If no parameter of creep is at an end, two times are equal."""
     found = result("effects_found", ("creep",), 0.07, [])
     end = AtEnd("weights 2", 4.0, "largest", 3.0, 9.0 if why == "no less" else None, 0.07, why)
     named = dataclasses.replace(found.effects[0], at_an_end=True, ends=(end,))
@@ -328,8 +328,8 @@ def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, 
 
 
 def test_no_worse_than_the_model_of_identify() -> None:
-    """A front of dead zones bends both ways and the records have only one loop, so no effect is named. The plain plays
-    of the nominal model are far worse than the model that `identify` finds on the same records."""
+    """A dead-zone front bends both ways and the records have only one loop, so no effect is named. The nominal model's
+    plain plays are far worse than the model that `identify` finds on the same records."""
     t = np.arange(800) * 1e-3
     records = []
     for seed in range(2):
@@ -374,7 +374,7 @@ def test_the_sentence_is_about_what_is_most_of_the_error(
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("bent", "names"), [(2e-4, 1), (2e-3, 0)])
 def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> None:
-    """With a lag and a bent sensor on a repeated sine, one effect is named, or none if the other leaves so much error
+    """With a lag and a bent sensor on a repeated sine, one effect is named, or none if the other causes so much error
     that the name may be wrong. The report says what to record."""
     t = np.arange(3000) * 1e-3
     v = 50.0 - 50.0 * np.cos(2 * np.pi * 4.0 * t)
@@ -393,7 +393,7 @@ def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> 
 
 
 def test_a_record_of_which_most_is_not_compared_is_told() -> None:
-    """Its drive first turns late, and not far enough to reveal a start memory."""
+    """The record's drive first turns late, and not far enough to reveal a start memory."""
     v = np.concatenate([np.linspace(0.0, 100.0, 3000), np.linspace(100.0, 90.0, 300)])
     late = record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "late")
     early = record(w := wander(3), noisy(brute_output(w, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "early")
@@ -404,8 +404,8 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
 
 
 def test_start_memories_of_held_out_records_are_found_where_all_together_need_them() -> None:
-    """A start memory found by a model without the effects contains their error and would judge them by it, so held-out
-    records get one only if they need it together. A fit needs each of its records."""
+    """A start memory found by a model without the effects contains part of them and would distort the comparison, so
+    held-out records get one only if all together need it. A fit needs each of its records."""
     growing = 50.0 - np.linspace(10.0, 50.0, 2000) * np.cos(np.linspace(0.0, 10.0 * np.pi, 2000))
     steady = wander(3)
 
@@ -426,7 +426,7 @@ def test_start_memories_of_held_out_records_are_found_where_all_together_need_th
 
 
 def test_a_start_is_wiped_by_what_the_plays_see() -> None:
-    """The drive steps to the ends of the range, where the stage arrives six samples late; until then the output depends
+    """The drive steps to the ends of the range, which the stage reaches six samples late; until then the output depends
     on drives before the record."""
     v = np.repeat([40.0, 100.0, 0.0, 70.0, 30.0], 40)
     seen = np.full(len(v), 40.0)
@@ -473,7 +473,7 @@ class TestNoise:
         assert selection.difference(less, before) > 0.9
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
-        """An oscillation that decays in a hold is not noise, however large; slow random motion is."""
+        """A decaying oscillation in a hold is not noise, however large; slow random motion is."""
         rng = np.random.default_rng(7)
         t = np.arange(2000) * 1e-3
         v = np.interp(t, [0.0, 0.5, 0.9, 1.4, 2.0], [0.0, 90.0, 90.0, 5.0, 0.0])
@@ -485,7 +485,7 @@ class TestNoise:
             slow[k] = 0.9 * slow[k - 1] + rng.normal(0.0, 0.05 * np.sqrt(1.0 - 0.81))
         found = noise_floor([self.item(0.1 * v + slow, v)]).holds
         assert found is not None
-        # of 240 samples 13 are independent, and some of their motion is taken for creep
+        # 240 samples are worth 13 independent ones, and some of their motion is taken for creep
         assert found == pytest.approx(0.05, rel=4.0 / np.sqrt(2.0 * 13))
 
 
@@ -535,7 +535,7 @@ def test_a_smooth_front_has_the_slopes_of_its_shape(drive: tuple[float, float], 
     u = (middles - 0.5 * (low + high)) / (0.5 * (high - low))
     expected = np.exp(sum(c * u**k for k, c in enumerate(shape, 1)))
     expected *= 16.0 / np.sum(expected)  # the range keeps its length
-    # away from the breaks: a break near 0 is moved a little
+    # away from the breaks, since a break near 0 is moved a little
     step = 0.1 * (edges[1] - edges[0])
     slopes = (stage.forward(middles + step) - stage.forward(middles - step)) / (2.0 * step)
     # the moved break changes the length of two pieces by a twentieth; numbers of the stage have ten digits
@@ -544,7 +544,7 @@ def test_a_smooth_front_has_the_slopes_of_its_shape(drive: tuple[float, float], 
 
 
 def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Path) -> None:
-    """The sensor sees the offset too, so a strong curve is found only if its argument includes the offset."""
+    """The sensor also sees the offset, so a strong curve is found only if its argument includes the offset."""
     records = []
     for number, reach in enumerate((100.0, 60.0, 100.0), 1):
         v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (reach / 100.0) * (wander(number) - 40.0)])
@@ -560,7 +560,7 @@ def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Pat
 
 @pytest.mark.parametrize(("rate", "start"), [(40.0, 0.0), (0.0, 30.0), (40.0, 30.0)])
 def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
-    """Creep from any start acts before the sensor, a drift behind it: with the right numbers no error is left."""
+    """Creep from any start acts before the sensor, a drift after it; with the right numbers no error remains."""
     v = wander(5, turns=40)
     v[:40] = np.linspace(0.0, v[40], 40)
     t = np.arange(len(v)) * 1e-3
@@ -573,7 +573,7 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
         creep,
         SensorPolynomial(name="sensor_nonlinearity", coefficients=(-0.12,), scale=100.0),
     )
-    # the starts of the drift and of the creep are free
+    # the start states of drift and creep are free
     item = Item("made", Run(t, v), y - 50.0, None, float(np.ptp(y)))
     error = Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
     assert np.max(np.abs(error)) < 1e-6
@@ -589,7 +589,7 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
 )
 @pytest.mark.parametrize("place", [0.0, 30.0])
 def test_a_drive_at_rest_leaves_the_offset_free(place: float, bent: Effect, samples: int) -> None:
-    """Even if a map bends the output, a record at rest determines nothing but its offset."""
+    """Even if a map bends the output, a record at rest determines only its offset."""
     v = np.full(200, place)
     y = noisy(np.full(200, 12.0), 0.02)
     y[:-samples] = np.nan
@@ -599,7 +599,7 @@ def test_a_drive_at_rest_leaves_the_offset_free(place: float, bent: Effect, samp
 
 
 def test_a_shape_that_contains_a_simpler_one_goes_on_from_it(tmp_path: Path) -> None:
-    """It continues with the simpler shape's weights too, since those of a straight sensor would not suit it."""
+    """The search starts with the simpler shape's weights too, since those for a straight sensor would not suit it."""
 
     def made(number: int) -> Record:
         v = wander(number, turns=40)
@@ -636,7 +636,7 @@ def test_a_curved_sensor_beside_a_drift(tmp_path: Path, curve: float) -> None:
 
 
 def test_a_drift_is_not_explained_by_free_start_states(tmp_path: Path) -> None:
-    """With an unknown history creep may begin anywhere in every record, which imitates a drift piece by piece."""
+    """With an unknown history, creep may start anywhere in every record, which imitates a drift piece by piece."""
     records = []
     for number in range(1, 6):
         v = wander(number, turns=40)
@@ -648,7 +648,7 @@ def test_a_drift_is_not_explained_by_free_start_states(tmp_path: Path) -> None:
 
 
 def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> None:
-    """Only the steps of one record are faster than the amplifier. If it is held out, no number is fitted to them."""
+    """Only one record has steps faster than the amplifier. If it is held out, no parameter is fitted to them."""
     slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]
     steps = np.concatenate([np.zeros(40), np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
 
@@ -665,7 +665,7 @@ def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> N
     assert any(advice.startswith("fit record 2 too and hold out others") for advice in found["advice"])
     found = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0]).content
     assert [effect["name"] for effect in found["effects"]] == ["slew_limit"]
-    # the noise gives the rate a standard error of 0.05 / |slope|; four of these are allowed
+    # the noise gives the rate a standard error of 0.05 / |slope|; four standard errors are allowed
     slope = (output(steps, 7001.0) - output(steps, 6999.0)) / 2.0
     assert abs(found["effects"][0]["parameters"]["rate"] - 7000.0) <= 4.0 * 0.05 / np.linalg.norm(slope)
     assert not any("hold out others" in advice for advice in found["advice"])
@@ -674,8 +674,8 @@ def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> N
 @pytest.mark.parametrize("curve", [None, 0.3])
 @pytest.mark.parametrize(("weight", "left"), [(0.0, 1.0), (1e-4, 1.0), (0.2, 0.0)])
 def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: float, curve: float | None) -> None:
-    """A ramp is explained as the beginning of a slow state only if the state has enough weight, with a straight sensor
-    or a curved one."""
+    """A ramp is explained as the start of a slow state only if that state has enough weight, with a straight sensor or
+    a curved one."""
     v = wander(1, turns=40)
     run = Run(np.arange(len(v)) * 1e-3, v)
     slow = ExponentialCreep(name="creep", time_constants=(50.0,), weights=(weight,))
@@ -697,7 +697,7 @@ def _only(actuator: Actuator) -> hypothesis.Structure:
 @pytest.mark.parametrize("curve", [None, 0.3])
 @pytest.mark.parametrize("plays", [1, 2, 7, 8])
 def test_every_other_threshold_leaves_hardly_more(plays: int, curve: float | None) -> None:
-    """Behind a curved sensor too, where the output is not linear in the weights."""
+    """This also holds behind a curved sensor, where the output is not linear in the weights."""
     places = np.linspace(0.0, 30.0, plays + 1)
     weights = np.append(1.0, np.full(plays, 0.6 / plays))
     v = wander(5, turns=40)
@@ -737,16 +737,16 @@ def _bent(folder: Path, codes: float, metres: float) -> dict[str, Any]:
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("codes", "metres"), [(436.9, 1e-6), (1e-6, 1e6)])
 def test_units_do_not_matter(codes: float, metres: float, tmp_path: Path) -> None:
-    """With a drive in converter codes and an output in metres, the diagnosis is the same as with V and um."""
+    """With the drive in converter codes and the output in metres, the diagnosis is the same as with V and um."""
     plain, other = _bent(tmp_path, 1.0, 1.0), _bent(tmp_path, codes, metres)
     assert [effect["name"] for effect in other["effects"]] == [effect["name"] for effect in plain["effects"]]
     assert [effect["name"] for effect in other["effects"]] == ["asymmetry"]
-    # either search may stop up to 1e-5 of its error above the minimum, or by the share of one sample
+    # either search may stop above the minimum by 1e-5 of its error, or by one sample's part of it
     assert other["gap"]["after"]["holdout"] == pytest.approx(plain["gap"]["after"]["holdout"] * metres, rel=1e-3)
 
 
 def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
-    """The stops are behind the plays and off centre: no front and no limit that is equal at both ends explains them."""
+    """The stops are behind the plays and off centre: neither a front nor a symmetric limit explains them."""
     lower, upper, give = -5.0, 118.0, 0.3
     records = []
     for number in range(1, 7):
@@ -768,8 +768,8 @@ def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
     ("rates", "aside"),
     [
         ([1, 1, 1, 1, 1, 1], [2, 5]),
-        ([1, 1, 9, 1, 6, 1], [2, 5]),  # one fast record to fit, another to judge by
-        ([1, 1, 9, 1, 1, 8], [1, 5]),  # every third record would leave both on one side
+        ([1, 1, 9, 1, 6, 1], [2, 5]),  # one fast record is fitted, another held out
+        ([1, 1, 9, 1, 1, 8], [1, 5]),  # every third record would leave both fast ones on one side
         ([1, 9, 1, 1, 8, 1], [1, 5]),
         ([1, 1, 9, 1, 1, 1], [2, 5]),  # a single fast record cannot be on both sides
         ([1, 9, 1, 1, 8, 7], [2, 5]),
@@ -786,7 +786,7 @@ def test_either_side_has_fast_records(rates: list[float], aside: list[int]) -> N
 
 
 def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:
-    """The refitted model is the same whatever a held-out record contains."""
+    """The refitted model does not depend on the content of a held-out record."""
     records = []
     for number in (1, 2, 3):
         v = np.concatenate([np.linspace(0.0, 30.0, 40), 0.3 * wander(number, turns=40)])
@@ -801,7 +801,7 @@ def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:
 
 
 def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) -> None:
-    """Without a history only the way back of a single sweep can be compared; with one, all of it."""
+    """Without a history, only the way back of a single sweep can be compared; with a history, all of it."""
     v = np.concatenate([np.linspace(0.0, 100.0, 600), np.linspace(100.0, 90.0, 60)])
     sweep = record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "sweep")
     path = _model(tmp_path)
@@ -811,7 +811,7 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
     with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: at most \d in a .*--history"):
         hystgen.diagnose(path, short, holdout=short)
-    last = record(v[:600], np.asarray(sweep.y)[:600], "last")  # it ends at its largest drive
+    last = record(v[:600], np.asarray(sweep.y)[:600], "last")  # the record ends at its largest drive
     with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: too few samples to fit: at most 1 in a"):
         hystgen.diagnose(path, last, holdout=last)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
@@ -829,7 +829,7 @@ def _behind_a_cycle(drives: list[Array]) -> list[Record]:
 
 
 def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> None:
-    """The errors it would cause at the starts are not taken for an effect."""
+    """The errors that it would cause at the starts are not taken for an effect."""
     records = _behind_a_cycle([wander(number) for number in (1, 2, 3, 4)])
     right, wrong, none = (
         hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:], history=history)
@@ -847,7 +847,7 @@ def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> Non
 
 
 def test_short_records_without_the_history_that_the_starts_contradict(tmp_path: Path) -> None:
-    """In place of the history start memories are found; without them next to nothing could be compared."""
+    """Start memories are found in place of the history; without them hardly any samples could be compared."""
     ways = [np.random.default_rng(number).uniform(0.0, 100.0, 9) for number in range(8)]
     legs = [np.concatenate([[way[0], 60.0, 5.0, 0.0, 100.0], way[1:]]) for way in ways]
     records = _behind_a_cycle([np.interp(np.arange(130) / 10.0, np.arange(len(leg)), leg) for leg in legs])
@@ -859,7 +859,7 @@ def test_short_records_without_the_history_that_the_starts_contradict(tmp_path: 
 
 @pytest.mark.parametrize("command", ["identify", "diagnose"])
 def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Path, run: Call) -> None:
-    """A wildcard may do that, but a record that is fitted tests nothing."""
+    """A wildcard may cause this, but a fitted record tests nothing."""
     v = wander(1)
     files = [write_csv(tmp_path / name, v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01, seed))
              for seed, name in enumerate(("a.csv", "b.csv", "c.csv"))]  # fmt: skip
@@ -878,7 +878,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
 
 @pytest.mark.parametrize("held_out", [True, False])
 def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> None:
-    """If it is the only held-out record, others judge in its place; otherwise a note says that it is not compared."""
+    """If it is the only held-out record, others are held out instead; otherwise a note says that it is not compared."""
     rng = np.random.default_rng(1)
     ends = [rng.permutation(np.linspace(0, 100, 11)) for _ in "abcd"]
     drives = [np.concatenate([[50, 100, 0], np.interp(np.arange(900), np.arange(0, 901, 90), x)]) for x in ends]
@@ -911,7 +911,7 @@ def test_no_records_to_judge_by(tmp_path: Path) -> None:
     ids=lambda effect: effect.name,
 )
 def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: Effect) -> None:
-    """It keeps the largest threshold although its play has no weight, since stretches are measured in it."""
+    """The file keeps the largest threshold although its play has no weight, since stretches are relative to it."""
     places, weights = np.array([0.0, 10.0, 20.0, 30.0]), np.array([1.0, 0.5, 0.25, 0.0])
     form = hypothesis.Structure(places, Kept(), (hypothesis.kept(effect),))
     v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
@@ -927,7 +927,7 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     outcome = selection.Outcome(fitted, fitted, (), ())
     extended = hystgen.Model(_extended(given.parameters, given.cascade, outcome, ready, ()))
     (found,) = extended.chain.simulate([run], [0.0])
-    # weights are written with ten digits; each multiplies up to 100, and the offset absorbs the mean of that error
+    # weights are written with ten digits; each multiplies up to 100, and the offset absorbs the mean error
     assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
 
 
@@ -942,7 +942,7 @@ def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
 
 
 def test_a_bend_that_may_be_the_stage_s_or_the_sensor_s_is_said_where_c_is_made(tmp_path: Path, run: Call) -> None:
-    """The loops are so narrow that a bend in front of the plays looks like one in the sensor behind them."""
+    """The loops are so narrow that a bend in front of the plays looks like a bend of the sensor behind them."""
 
     def output(_: Array, v: Array) -> Array:
         bent = v + 0.003 * (v - 20.0) ** 2
@@ -966,7 +966,7 @@ def test_a_bend_that_may_be_the_stage_s_or_the_sensor_s_is_said_where_c_is_made(
 
 
 class TestNominalEffects:
-    """The nominal model already has effects: their numbers are refitted, and wrong ones are not a missing effect."""
+    """The nominal model has effects. Their parameters are refitted; wrong values do not show as a missing effect."""
 
     def records(self, before: Callable[[Array], Array], behind: Callable[[Array], Array]) -> list[Record]:
         """Records of plays with one function before and one behind them."""
@@ -995,14 +995,14 @@ class TestNominalEffects:
 
     @pytest.mark.parametrize("level", [30.0, 33.0])
     def test_a_hard_limit(self, tmp_path: Path, level: float) -> None:
-        """A correct nominal limit stays too, though weights fitted without it stay below it, where it does nothing."""
+        """A correct nominal limit is kept, although weights fitted without it stay below it, where it is inactive."""
         records = self.records(lambda v: v, lambda y: np.minimum(y, 30.0))
         found = self.diagnosed(tmp_path, records, {"name": "saturation", "shape": "stops", "lower": -900.0,
                                                    "upper": level, "give": 0.0})  # fmt: skip
         self.check(found, "upper", 30.0)
 
     def test_gains_of_records_that_come_and_go(self) -> None:
-        """Gains cached for a record are not used for a later one at the same address in memory."""
+        """Gains cached for a record are not used for a later record at the same memory address."""
         effect = ExponentialAgeing(name="ageing", shape="exponential", loss=0.05, travel=100.0)
         actuator = Actuator(np.array([0.0]), (), (effect,))
         for number in range(200):
@@ -1014,7 +1014,7 @@ class TestNominalEffects:
 
     @pytest.mark.parametrize("history", [None, (100.0, 0.0)])
     def test_a_history_says_nothing_of_slow_states(self, history: tuple[float, ...] | None) -> None:
-        """A history tells what the plays remember but not when the drive was there, so creep may still be going on."""
+        """A history gives the memory of the plays but not its timing, so creep may still be going on."""
         effect = ExponentialCreep(name="creep", time_constants=(4.0,), weights=(0.06,))
         actuator = Actuator(np.array([0.0]), (), (effect,))
         v = wander(3, 20)
@@ -1037,7 +1037,7 @@ class TestNominalEffects:
 
 
 class TestOwnEffects:
-    """A user's own effect takes part like those of the catalogue."""
+    """A user's own effect is treated like the catalogue's effects."""
 
     def records(self, amplitude: float, period: float) -> list[Record]:
         """Records of plays plus an offset from a duty cycle."""
@@ -1051,7 +1051,7 @@ class TestOwnEffects:
     @pytest.mark.thorough(but_one_in=2)
     @pytest.mark.parametrize(("amplitude", "period"), [(2.0, 3.3), (-6.0, 11.0)])
     def test_it_is_found_named_and_added(self, tmp_path: Path, run: Call, amplitude: float, period: float) -> None:
-        """Its amplitude may have either sign, and be larger than where the search starts."""
+        """The effect's amplitude may have either sign, and may exceed the value at which the search starts."""
         records = self.records(amplitude, period)
         for each in records:
             table = np.column_stack([each.t, each.v, each.y])
@@ -1063,7 +1063,7 @@ class TestOwnEffects:
         assert code == 0, err
         (effect,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["effects"]
         assert effect["name"] == "user:neighbour"
-        # standard errors of amplitude and period with free offsets and weights; four of these are allowed
+        # standard errors of amplitude and period with free offsets and weights; four of each are allowed
         columns = []
         for k, each in enumerate(records[:3]):
             angle = 2.0 * np.pi * np.asarray(each.t) / period
@@ -1084,7 +1084,7 @@ class TestOwnEffects:
 
     @pytest.mark.thorough
     def test_numbers_that_make_nothing_end_its_search(self, tmp_path: Path) -> None:
-        """Right beside the start the output is infinite; the effect is then not named."""
+        """If the output is infinite right next to the start of the search, the effect is not named."""
 
         class Cliff(Effect):
             name: Literal["user:cliff"] = "user:cliff"
@@ -1168,7 +1168,7 @@ def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
 
 
 def test_a_model_with_a_bent_sensor_is_refitted(tmp_path: Path) -> None:
-    """The sensor's curve only fits outputs of the right size; a search that begins far from them may end anywhere."""
+    """The sensor's curve only suits outputs of the right size; a search that starts far from them may end anywhere."""
     v = np.concatenate([np.linspace(0.0, 100.0, 200), wander(3), wander(8)])
     x = brute_output(v, (0.0, 5.0, 12.0, 25.0), (0.04, 0.01, 0.01, 0.01), 0.0)
     xi = x / 6.0
@@ -1225,10 +1225,10 @@ def test_numbers_far_from_where_drives_are_fast_are_found(tmp_path: Path, name: 
 
 
 def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the best effect is unsure because few blocks show it, one that is sure but explains far less is not named."""
+    """If the best effect is uncertain because few blocks show it, a certain one that explains far less is not named."""
 
     def step(*held_out: float) -> object:
-        """Held-out error of the accepted effect, None if there is none; the first option is unsure, the second sure."""
+        """Held-out error of the accepted effect or None; the first option is uncertain, the second certain."""
         tried = [SimpleNamespace(held_out=left) for left in held_out]
         worth = selection.Merit(1.0, 1.0, 0.5, 1e-6)
         monkeypatch.setattr(selection, "simplest_first", lambda found, _: found)
@@ -1242,7 +1242,7 @@ def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPat
     removes = True
     assert step(0.287, 0.4167) is None
     assert step(0.35, 0.4167) == 0.4167
-    removes = False  # the first one's gain is due to its free terms
+    removes = False  # the first option's gain is due to its free terms
     assert step(0.287, 0.4167) == 0.4167
 
 
@@ -1279,7 +1279,7 @@ def test_rooms_import_earlier_rooms_and_no_report() -> None:
 
 
 def test_ends_of_fitted_records_judge_too() -> None:
-    """Ends of fitted records are held out once, even if records have the same name."""
+    """The ends of fitted records are held out once each, even if records have the same name."""
 
     def made(seed: int, name: str) -> Record:
         v = wander(seed)
@@ -1300,7 +1300,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
 
 @pytest.mark.thorough
 def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
-    """Another axis moves slowly during the fitted records but not during the held-out one, whose drive hardly moves."""
+    """Another axis moves slowly during the fitted records, but not during the held-out one, which hardly moves."""
     records = []
     for number in (1, 2, 3):
         v = wander(number) if number < 3 else 49.5 + 0.01 * wander(number)

@@ -1,11 +1,11 @@
-"""The documentation: every command and code block runs, every link leads somewhere, every page fits a phone.
+"""The documentation: every command and code block runs, every link has a target, every page fits a phone.
 
-A page is a test: its blocks run from top to bottom in a folder with the examples, a recording, a held-out one and the
-model `stage_x` identified from them. The language of a fence means:
+Each page is a test: its blocks run from top to bottom in a folder with the examples, a recording, a held-out recording
+and the model `stage_x` identified from them. The language of a fence means:
 
 - `sh`: commands that succeed
 - `console`: commands after `$`, with their exact output; `...` stands for any text
-- `python`: code in one namespace per page; a comment behind a print gives its output
+- `python`: code in one namespace per page; a comment after a print gives its output
 - `c`: code that compiles against the emitted `stage_x`
 - `yaml`, `text`: the file that the sentence before it names; `yaml` is all or part of a parameter file that loads
 """
@@ -59,14 +59,14 @@ TARGET_CALLS = 100
 """Calls per record on emulated cores, if the page gives no number."""
 
 SHORTER = {"python examples/compensate_plants.py -o docs": " --plant 'Dahl friction in a positioner'"}
-"""Commands that take minutes, and the option that limits each to a part of its work here."""
+"""Commands that take minutes, and the option that limits each to part of its work here."""
 
 ELSEWHERE = {
     "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
     "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
         "test_session.py::test_the_command_of_the_plan_cuts_the_recording",
 }  # fmt: skip
-"""Commands that take too long here, and the tests that run the same."""
+"""Commands that take too long here, and the tests that run them."""
 
 
 # Blocks --------------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ class Block:
 
     @property
     def saved_as(self) -> str | None:
-        """Name of the file that the sentence before the block asks to save, or None."""
+        """File name under which the sentence before the block asks to save it, or None."""
         found = re.search(r"[Ss]ave\s+(?:this|that|it)\s+as\s+`([^`]+)`[^`]*$", self.words)
         return found[1] if found else None
 
@@ -105,7 +105,7 @@ def commands(text: str) -> list[str]:
 
 @dataclass
 class Page:
-    """A page being run: its folder, the names its Python has defined, and the last exit code."""
+    """A page being run: its folder, the names that its Python code has defined, and the last exit code."""
 
     folder: Path
     names: dict[str, Any]
@@ -122,7 +122,7 @@ class Page:
         assert block.saved_as, "a block of text that is not a file"
 
     def yaml(self, block: Block) -> None:
-        """Load a parameter file, or the model with part of one."""
+        """Load a parameter file, or the model with a part of a file merged into it."""
         part = YAML(typ="safe", pure=True).load(block.text)
         if part is None:  # comments for an editor
             return
@@ -134,13 +134,13 @@ class Page:
         hystgen.load(self.folder / "page.yaml")
 
     def c(self, block: Block) -> None:
-        """Compile a C file beside the emitted module."""
+        """Compile a C file next to the emitted module."""
         (self.folder / "page.c").write_text(block.text)
         flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", "firmware", "-c", "-o", os.devnull]
         subprocess.run(["cc", *flags, "page.c"], cwd=self.folder, check=True)
 
     def python(self, block: Block) -> None:
-        """Run code and compare its output with the comments behind its prints."""
+        """Run code and compare its output with the comments after its prints."""
         ast.parse(block.text)
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
@@ -187,7 +187,7 @@ class Page:
         return str(done.stdout)
 
     def own(self, command: str) -> str:
-        """Run the command line in this process; patterns without quotes are expanded as in a shell."""
+        """Run the command line in this process; unquoted patterns are expanded as in a shell."""
         arguments = []
         for word in shlex.split(re.sub(r"\s+# .*", "", command), posix=False)[1:]:
             (plain,) = shlex.split(word)
@@ -213,7 +213,7 @@ def merged(whole: Any, part: Any) -> Any:
 
 
 def installs(requirements: list[str]) -> bool:
-    """Whether all requirements are this project, with extras that it has."""
+    """Whether every requirement is this project, with no extras but its own."""
     for requirement in (word for word in requirements if word != "-e"):
         found = re.fullmatch(r"(?:\.|hystgen)(?:\[([\w,]+)\])?", requirement)
         if found is None or not set((found[1] or "all").split(",")) <= PROJECT["optional-dependencies"].keys():
@@ -222,13 +222,13 @@ def installs(requirements: list[str]) -> bool:
 
 
 def bounded(verify: Any, *given: Any, target_length: int | None = None, **options: Any) -> Any:
-    """Verify over records so short that compiling the reference would take longer than running it in Python."""
+    """Verify with records so short that compiling the reference would take longer than running it in Python."""
     with jit.plain():
         return verify(*given, length=CALLS, target_length=target_length or TARGET_CALLS, **options)
 
 
 def add_droop(folder: Path) -> None:
-    """Give the model a sample time, and add a recording with the effect `user:droop` made from its equation alone."""
+    """Give the model a sample time, and add a recording with `user:droop`, computed from its equation alone."""
     known = folder / "stage_x.yaml"
     known.write_text(f"sample_time: {STEP}\n{known.read_text()}")
     static = hystgen.load(known)
@@ -264,7 +264,7 @@ LONG = {
     "docs/effects.md", "docs/tutorials/name-what-is-missing.md", "docs/howto/diagnose.md", "docs/howto/python.md",
     "docs/plants.md",
 }  # fmt: skip
-"""Pages that take as long as three others; `make test` runs others of their kind."""
+"""Pages that take as long as three others; `make test` runs similar ones instead."""
 
 
 @pytest.mark.parametrize(
@@ -348,7 +348,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def broken(*pages: Path) -> list[str]:
-    """Links of pages, or of all pages in a folder, to a missing file or anchor; links to other sites are not tried."""
+    """Links from pages, or all pages in a folder, to a missing file or anchor; external links are not followed."""
     lychee = Path(sys.executable).parent / "lychee"
     command = [lychee, "--offline", "--no-progress", "--include-fragments=anchor-only", "--format", "json", *pages]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -365,7 +365,7 @@ def test_links_of_the_site_lead_somewhere(site: Path) -> None:
 
 
 def test_links_of_the_pages_lead_somewhere_without_the_site() -> None:
-    """The links also work when the pages are read in the repository."""
+    """Links also work if the pages are read in the repository."""
     assert broken(*ROOT.glob("*.md"), *DOCS.rglob("*.md")) == []
 
 
@@ -388,7 +388,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
 
 @pytest.mark.thorough
 def test_the_references_are_of_the_program(site: Path) -> None:
-    """Each generated page contains some names of the program."""
+    """Each generated page contains some of the program's names."""
     for page, words in {
         "command-line": ("--allow-partial", "--target-length", "hystgen schema"),
         "parameter-file": ("input_range", "drive_lsb", "noise_gain", "initial_state"),
@@ -406,7 +406,7 @@ def test_the_references_are_of_the_program(site: Path) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize("width", [390, 1280])
 def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, chromium: str, tmp_path: Path) -> None:
-    """In a browser no page is wider than its window, every picture is drawn, and the console shows no error."""
+    """In a browser, no page is wider than its window, every picture is drawn, and the console shows no error."""
     pages = sorted(path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md"))
     (tmp_path / "frames.html").write_text(
         f"""<!DOCTYPE html><body><pre></pre><script>

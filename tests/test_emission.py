@@ -1,4 +1,4 @@
-"""Emitted C: equal bits with every compiler, clean in every dialect, no foreign symbols, the same bytes anywhere."""
+"""Emitted C: equal bits with every compiler, no warnings in any dialect, no foreign symbols, always the same text."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from hystgen.verification import comparison, compilers, host, signals, sources
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
 DIALECTS = (["-std=c99"], ["-std=c11"], ["-x", "c++", "-std=c++17"])
-FIXED_PLACE = ["-fno-pic", "-fno-pie"]  # as firmware is built; otherwise constant pointers go into a data section
+FIXED_PLACE = ["-fno-pic", "-fno-pie"]  # as for firmware; otherwise constant pointers go into a data section
 OLDER = (["-std=gnu89"], ["-x", "c++", "-std=gnu++98"], ["-x", "c++", "-std=gnu++11"])
 
 
@@ -52,11 +52,11 @@ def required_compilers() -> list[compilers.Compiler]:
 
 
 LENGTH = 20_000
-"""Calls of each record: a fifth of the default of `verify`, and enough to show all mutants of `test_mutants.py`."""
+"""Calls per record: a fifth of `verify`'s default, and enough to reveal all mutants of `test_mutants.py`."""
 
 
 def check_codegen(name: str, **options: str) -> None:
-    """Check that the emitted C gives the bits of the reference."""
+    """Check that the emitted C gives the same bits as the reference."""
     required_compilers()
     report = hystgen.verify(model(name), operator="both", length=LENGTH, **options)
     assert report.ok, report.table()
@@ -82,7 +82,7 @@ ROUND = {
 @pytest.mark.parametrize("name", ROUND)
 @pytest.mark.thorough
 def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: str) -> None:
-    """With round numbers, rounding decides which of two corners is left first and which play follows."""
+    """With round numbers, rounding decides which of two corners the drive leaves first, and which play follows."""
     ends, thresholds, weights = ROUND[name]
     pi = f"{{thresholds: {thresholds}, weights: {weights}}}"
     text = f"hystgen: 1\nname: {name}\ninput_range: {ends}\nmodel:\n  pi: {pi}\n"
@@ -91,7 +91,7 @@ def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: s
     assert report.ok, report.table()
 
 
-# Cases that once gave other bits: a range, thresholds, weights, more of the model, and calls
+# Cases that once gave different bits: a range, thresholds, weights, the rest of the model, and calls
 TIES: dict[str, tuple[tuple[float, float], list[float], list[float], str, str]] = {
     "a commit leads beyond what may be asked for": (
         (-10, 10),
@@ -142,7 +142,7 @@ OPERATIONS = {"step": slots.OP_STEP, "commit": slots.OP_COMMIT, "reset": slots.O
 
 
 def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str, int, int]]:
-    """For each build on this machine: its name, its samples, and how many differ from the reference in a bit."""
+    """For each build on this machine: its name, its number of samples, and how many differ from the reference."""
     real = ARITHMETICS["float32"].number
     record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
     files = sources.write(folder, one, emit_options(one, "inverse", "float32", "corners"))
@@ -165,7 +165,7 @@ def test_bits_equal_where_rounding_once_decided_otherwise(name: str, tmp_path: P
 
 
 def of_round_numbers(rng: np.random.Generator) -> Model:
-    """A model with evenly spaced thresholds and a range that is a multiple of the spacing, about, from or beyond 0."""
+    """A model with evenly spaced thresholds, whose range is a multiple of the spacing, around, from or beyond 0."""
     n = int(rng.choice([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 40]))
     step = float(rng.choice([0.25, 0.5, 1.0, 0.1, 0.3]))
     reach = step * max(n, 1) * float(rng.choice([0.5, 1.0, 1.25, 2.0]))
@@ -180,13 +180,13 @@ def of_round_numbers(rng: np.random.Generator) -> Model:
     return Model(parse_parameters(text, "round.yaml"))
 
 
-ONCE = (16, 50, 72, 84, 85, 95, 112, 116, 127, 136)  # seeds of models that once gave other bits
+ONCE = (16, 50, 72, 84, 85, 95, 112, 116, 127, 136)  # seeds of models that once gave different bits
 
 
 @pytest.mark.thorough(but_one_in=7)
 @pytest.mark.parametrize("seed", [*range(4), *ONCE])
 def test_bits_equal_in_models_of_round_numbers(seed: int) -> None:
-    """Ties of all kinds: 18 of 232 such models once gave other bits, each in a few of 10^6 samples."""
+    """Ties of all kinds: 18 of 232 such models once gave different bits, each in a few of 10^6 samples."""
     rng = np.random.default_rng(seed)
     one = of_round_numbers(rng)
     arithmetic = str(rng.choice(["float32", "float32", "float64"]))
@@ -195,7 +195,7 @@ def test_bits_equal_in_models_of_round_numbers(seed: int) -> None:
 
 
 def beside_limits(one: Model, length: int) -> signals.Calls:
-    """Calls that lead near a limit of the drive, and some that repeat earlier ones to within a few last units."""
+    """Calls near a limit of the drive, some of which repeat earlier ones to within 16 units in the last place."""
     rng = np.random.default_rng(17)
     low, high = one.parameters.input_range
     least, most = one.cascade.output_range
@@ -208,7 +208,7 @@ def beside_limits(one: Model, length: int) -> signals.Calls:
             x[i] = rng.choice([low, high, rng.uniform(low, high)])
         elif kind < 0.4:
             x[i] = before + int(rng.integers(-16, 17)) * np.spacing(before)
-        elif kind < 0.5:  # by rounding, a commit to an end of the range may lead beyond these
+        elif kind < 0.5:  # rounding may take a commit to an end of the range beyond these
             end = np.float32(rng.choice([least, most]))
             x[i] = end + int(rng.integers(-3, 4)) * np.spacing(end)
         elif kind < 0.98:
@@ -246,7 +246,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
 def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:
-    """The verification records cause no access outside an object and no undefined behaviour."""
+    """The verification records cause no out-of-bounds access and no undefined behaviour."""
     gcc = next((c for c in required_compilers() if c.name == "gcc"), None)
     if gcc is None:
         pytest.skip("gcc and its sanitizers are not installed")
@@ -270,7 +270,7 @@ ALONE = [
     for layout in LAYOUTS
     if operator == "both" or layout == LAYOUTS[0] or name in ("listed", "mixed")
 ]
-"""Every layout with both operators and every operator in one layout; for two models, all combinations."""
+"""Every layout with both operators, and each operator in one layout; for two models, all combinations."""
 
 
 @pytest.mark.slow(one_in=5)
@@ -303,7 +303,7 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
 @pytest.mark.parametrize("name", ["listed", "mixed"])
 @pytest.mark.thorough
 def test_compiles_in_older_dialects(name: str, arithmetic: str, layout: str, tmp_path: Path) -> None:
-    """GNU dialects, since 64-bit integers need extensions; <float.h> and <stdint.h> hide much in these dialects."""
+    """These are GNU dialects, since 64-bit integers need extensions; <float.h> and <stdint.h> hide much in them."""
     hystgen.emit(model(name), tmp_path, operator="both", layout=layout, arithmetic=arithmetic)
     if layout == "single-header":
         (tmp_path / "all.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')
@@ -317,7 +317,7 @@ def test_compiles_in_older_dialects(name: str, arithmetic: str, layout: str, tmp
 
 
 def test_unknown_precision_is_refused_and_says_why(tmp_path: Path) -> None:
-    """Refused if neither <float.h> nor the compiler states the precision of computations, or if it is another one."""
+    """Refused if neither <float.h> nor the compiler states the precision of computations, or if it is the wrong one."""
     gcc = next(compiler for compiler in required_compilers() if compiler.name == "gcc")
     hystgen.emit(model("plain"), tmp_path, layout="shared-runtime")
     run = functools.partial(gcc.run, ["-std=gnu89", "-c", "-o", tmp_path / "one.o", tmp_path / "plain.c"])
@@ -332,10 +332,10 @@ def test_unknown_precision_is_refused_and_says_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("x", [0, 7, -(2**31), 2**31 - 1, 2**31, -(2**31) - 1, -(3 * 10**9), -(2**63), 2**63 - 1])
 def test_whole_numbers_keep_their_value_in_every_dialect(x: int, tmp_path: Path) -> None:
-    """This holds without a warning on a core with 32-bit `long`, where C90 takes 3000000000 as unsigned."""
+    """Constants cause no warning on a core with 32-bit `long` either, where C90 takes 3000000000 as unsigned."""
     zig = next((compiler for compiler in required_compilers() if compiler.name == "zig"), None)
     assert zig
-    half = x // 2 if x % 2 == 0 else (x - 1) // 2  # so that the test itself needs no such literal
+    half = x // 2 if x % 2 == 0 else (x - 1) // 2  # so that the test itself needs no large literal
     rest = x - 2 * half
     words = f"((long long)0x{half & (2**64 - 1):x}ULL * 2 + {rest})"
     text = f"typedef char same[(long long)({literal(x)}) == {words} ? 1 : -1];\n"
@@ -352,12 +352,12 @@ def test_whole_numbers_keep_their_value_in_every_dialect(x: int, tmp_path: Path)
 ])  # fmt: skip
 @pytest.mark.thorough
 def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path: Path) -> None:
-    """Refused at compile time, except for reordering in clang, which it does not report; fixed point is unaffected."""
+    """Refused at compile time, except for reordering in clang, which does not report it; fixed point is unaffected."""
     for arithmetic in ("float32", "float64", "q31"):
         folder = tmp_path / arithmetic
         hystgen.emit(model("curved"), folder, operator="both", layout=layout, arithmetic=arithmetic, engine="corners")
         for compiler in required_compilers():
-            if compiler.name == "zig":  # a clang that takes -Ofast as -O3
+            if compiler.name == "zig":  # a clang that treats -Ofast as -O3
                 continue
             reported = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
             for source in folder.glob("*.c"):
@@ -447,8 +447,8 @@ model:
     ("float32", 360, 3600), ("q31", 360, 3500), ("q15", 360, 3500),
 ])  # fmt: skip
 def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, most: int, tmp_path: Path) -> None:
-    """An inverse stays within a number of lines of C and of code bytes on two cores, without comments and tables; both
-    operators take up to 1.6 times the bytes."""
+    """An inverse stays within limits of lines of C and bytes of code on two cores, without comments and tables; both
+    operators together take up to 1.6 times as many bytes."""
     zig = next(compiler for compiler in required_compilers() if compiler.name == "zig").command
     gcc = ("arm-none-eabi-gcc", "-mthumb")
     builds = (
@@ -481,7 +481,7 @@ def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, most:
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
 def test_nothing_is_copied_by_a_function_of_the_library(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """For a Cortex-M0+, gcc would copy structures of more than 16 bytes by memcpy."""
+    """For a Cortex-M0+, gcc would copy structures of more than 16 bytes by a call of memcpy."""
     hystgen.emit(model(name), tmp_path, operator="both", arithmetic=arithmetic, engine="corners")
     core = ["arm-none-eabi-gcc", "-std=c99", "-mcpu=cortex-m0plus", "-mthumb"]
     for level in ("-O0", "-Os", "-O2"):
@@ -510,7 +510,7 @@ def renamed(name: str, to: str) -> Model:
 @pytest.mark.parametrize("kind", ["plain", "listed", "bent", "mixed"])
 @pytest.mark.thorough
 def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path) -> None:
-    """Statements are wrapped for any length of name. With the longest name the C still compiles without warnings."""
+    """Statements are wrapped for names of any length. With the longest name the C still compiles without warnings."""
     one = renamed(kind, name)
     for arithmetic, engine, layout in itertools.product(ARITHMETICS, ENGINES, LAYOUTS):
         for operator in ("both", "forward", "inverse") if layout == LAYOUTS[0] else ("both",):
@@ -543,7 +543,7 @@ def test_every_effect_is_among_them() -> None:
 @pytest.mark.parametrize("arithmetic", ["float64", "q31"])
 @pytest.mark.parametrize("chain", EVERY_EFFECT)
 def test_no_line_of_an_effect_is_longer_than_100_columns(chain: str, arithmetic: str) -> None:
-    """float64 and q31 have the longest numbers."""
+    """Only float64 and q31 are checked, since they have the longest numbers."""
     for file, text in emitted_files(renamed(chain, "n" * MAX_NAME), operator="inverse", arithmetic=arithmetic).items():
         for line in text.splitlines():
             assert len(line) <= 100, f"{file}: {line}"
@@ -562,7 +562,7 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_files_name_their_licence_and_headers_what_made_them(layout: str, tmp_path: Path) -> None:
-    """Files have a line that licence scanners look for; headers have macros that a firmware can log."""
+    """Files have a line that licence scanners look for; headers have macros that firmware can log."""
     files = emitted_files(model("plain"), layout=layout)
     for name, text in files.items():
         assert text.splitlines()[0] == "/* SPDX-License-Identifier: 0BSD", name
@@ -580,7 +580,7 @@ def test_files_name_their_licence_and_headers_what_made_them(layout: str, tmp_pa
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", ["plain", "listed", "bent", "two_branches"])
 def test_numbers_of_functions_have_a_name(name: str, arithmetic: str, engine: str) -> None:
-    """Outside of tables and macros only counts occur more than once, and no offset of 0 is written out."""
+    """Outside tables and macros, only counts occur more than once, and no offset of 0 is written out."""
     files = emitted_files(model(name), operator="both", arithmetic=arithmetic, engine=engine)
     code = re.sub(r"/\*.*?\*/", "", files[f"{name}.c"], flags=re.DOTALL)
     code = re.sub(r"^#(?:.*\\\n)*.*$", "", code, flags=re.MULTILINE)
@@ -605,7 +605,7 @@ def test_templates_hold_no_algorithm() -> None:
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Path) -> None:
-    """The banner counts memory from the declarations of `c_runtime/`; this machine's compiler gives the same sizes."""
+    """The banner takes sizes from the declarations in `c_runtime/`; this machine's compiler gives the same sizes."""
     family = runtime.FAMILIES[arithmetic]
     variants = [
         runtime.Variant(engine, family, fronts, branches)
@@ -639,7 +639,7 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
 
 
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
-    """A table of measured costs per core, by the columns in front of the two cores."""
+    """A table of measured costs per core, keyed by the columns before the two cores."""
     with (Path(hystgen.__file__).parent / "compensator" / name).open() as file:
         header, *rows = csv.reader(file)
     cores = header[-2:]
@@ -647,7 +647,7 @@ def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
 
 
 def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
-    """Compared for each operator, arithmetic and kind; between measured numbers of plays the next smaller decides."""
+    """Checked for each operator, arithmetic and kind; between measured numbers of plays, the smaller one decides."""
     instructions, code = measured("engine_costs.csv"), measured("code_sizes.csv")
     more = measured("effect_sizes.csv")
     chosen = set()
@@ -675,7 +675,7 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
                 for optimize, of in costs.items():
                     cheaper = "corners" if of["corners"] < of["loop"] else "loop"
                     if effects and optimize != "speed" and arithmetic in ("q31", "q15"):
-                        cheaper = "loop"  # its stack is known to stay within 128 bytes
+                        cheaper = "loop"  # the loop's stack is known to stay within 128 bytes
                     assert choose("auto", optimize, cascade, operator, arithmetic, effects) == cheaper
                     chosen.add((optimize, cheaper))
     assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen
@@ -713,7 +713,7 @@ def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)
 def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
-    """Errors against the model in double precision, for drives and references inside the range."""
+    """Errors are relative to the model in double precision, for drives and references inside the range."""
     from hystgen.compensator.bounds import error_bounds
 
     one = model(name)
@@ -736,7 +736,7 @@ def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
     ("curved", {"operator": "inverse", "arithmetic": "q15", "engine": "corners"}),
 ])  # fmt: skip
 def test_golden(name: str, options: dict[str, str]) -> None:
-    """The emitted C is the reviewed copy; HYSTGEN_UPDATE_GOLDEN=1 renews it."""
+    """The emitted C equals the reviewed copy; HYSTGEN_UPDATE_GOLDEN=1 renews the copy."""
     folder = GOLDEN / name
     if os.environ.get("HYSTGEN_UPDATE_GOLDEN"):
         for stale in folder.glob("*"):

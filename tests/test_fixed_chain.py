@@ -77,7 +77,7 @@ def test_factors_are_multiplied_like_fractions() -> None:
 
 
 def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, Run]:
-    """A smooth reference with plateaus over a share of the output range, in codes and in physical units."""
+    """A smooth reference with plateaus over a fraction of the output range, in codes and in physical units."""
     rng = np.random.default_rng(seed)
     low, high = (float(end) for end in one.tables.limits.output[0])
     still = rng.random(N) < 0.2
@@ -99,7 +99,7 @@ STILL = {
 }
 
 BRANCHED = ("lagging", "aged", "everything", "relaxing")
-"""Chains whose memoryless part has two branches: fixed point sometimes takes the other branch for a sample."""
+"""Chains whose memoryless part has two branches: fixed point is sometimes on the other branch for a sample."""
 
 
 @pytest.mark.slow(one_in=2)
@@ -108,7 +108,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
 def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: float) -> None:
-    """Errors against the compensator and the chain in double precision, which share no code with fixed point."""
+    """Errors from the compensator and the chain in double precision, which share no code with fixed point."""
     one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, seed, share)
@@ -130,7 +130,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
 
 
 def shaken(one: Compiled, n: int, rate: float) -> Array:
-    """Ramp to mid-range at the largest step that bounds allow, then to and fro by it, creeping up by `rate` of it."""
+    """Ramp to mid-range in the largest steps that bounds allow, then back and forth by one, rising by `rate` of it."""
     low, high = one.static.input_range
     step = 0.999 * one.largest_step
     up = np.arange(low, 0.5 * (low + high), step)
@@ -157,7 +157,7 @@ def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[flo
 def test_bounds_of_viscous_plays_hold_for_a_shaken_drive_and_are_reached(
     name: str, n: int, rate: float, arithmetic: str
 ) -> None:
-    """Plays gain and lose contact inside each step, where the C's approximation of the law has errors that add up."""
+    """Plays gain and lose contact within each step, where errors of the C's approximation of the law add up."""
     one = model(CHAINS[name])
     numbers = tables.build(one.chain, arithmetic, T)
     worst, bound = wrong(one, arithmetic, numbers, shaken(numbers, n, rate))
@@ -174,7 +174,7 @@ SOFT = "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponen
     "text", [CHAINS["viscous"], chain("linear", LINEAR), chain("soft", SOFT)], ids=["viscous", "linear", "soft"]
 )
 def test_bounds_of_inverses_of_viscous_plays_hold_for_such_drives_and_are_reached(text: str, arithmetic: str) -> None:
-    """Given the model's own output as reference, the inverse undoes part of the error of its plays."""
+    """With the model's own output as its reference, the inverse undoes part of its plays' error."""
     one = model(text)
     numbers = tables.build(one.chain, arithmetic, T)
     codes = numbers.codes
@@ -192,14 +192,14 @@ def test_bounds_of_inverses_of_viscous_plays_hold_for_such_drives_and_are_reache
 
 
 def found_input(p: Array, d: Array, shift: Array, rate: Array) -> tuple[float, Array]:
-    """e with `p_0 e + sum p_i d_i = 0` after each play has moved by its share `rate` towards e plus its shift."""
+    """e with `p_0 e + sum p_i d_i = 0` after each play has moved by the fraction `rate` towards e plus its shift."""
     kept = (1.0 - rate) * d + rate * shift
     e = -float(p[1:] @ kept) / float(p[0] + p[1:] @ rate)
     return e, kept + rate * e
 
 
 def test_the_inverse_undoes_shifts_of_the_plays_input() -> None:
-    """Three, two and one plays are shifted in turn, in all combinations of signs; then plays follow only in part."""
+    """Three plays, then two, then one are shifted, in all combinations of signs; then plays follow only in part."""
     rng = np.random.default_rng(8)
     for _ in range(6):
         p = 10.0 ** rng.uniform(-1.0, 0.5, 4)
@@ -237,7 +237,7 @@ def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str
 
 
 def swept(one: Compiled, n: int) -> Array:
-    """Drive to and fro over the whole range from its lower end, at the largest step that bounds allow."""
+    """Drive back and forth over the whole range from its lower end, in the largest steps that bounds allow."""
     low, high = one.static.input_range
     way = 0.999 * one.largest_step * np.arange(n)
     return high - np.abs(way % (2.0 * (high - low)) - (high - low))
@@ -245,7 +245,7 @@ def swept(one: Compiled, n: int) -> Array:
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
-    """At the fastest rate that bounds allow, the gain stays within its limits, here after eight time constants."""
+    """At the fastest rate that bounds allow, the gain stays within its limits, here for eight time constants."""
     heat = "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.4, gain_per_degree: -0.02"
     one = model(chain("hot", heat, compensate="self_heating"))
     numbers = tables.build(one.chain, arithmetic, T)
@@ -260,7 +260,7 @@ def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
 @pytest.mark.parametrize("name", ["heated", "rubbed"])
 def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, arithmetic: str) -> None:
     """The inverse uses the gain before the last move, which matters most where the drive turns at an end. Half of the
-    bound for the heat of loops covers the error of few plays, which peaks only in a special order of nested loops."""
+    bound for the heat of loops covers the error of few plays, which peaks only for one order of nested loops."""
     one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     v = swept(numbers, N)
@@ -277,7 +277,7 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, 
 @pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])
 @BOTH
 def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
-    """Behind a lag that is led, the answers are those of double precision after the same drives."""
+    """With a lag compensated, the answers are those of double precision after the same drives."""
     one = model(chain("led", *STILL[name]))
     numbers, codes = compiled(one, arithmetic)
     drive = float(codes.drive_lsb)
@@ -336,7 +336,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
 
 @BOTH
 def test_branches_are_mostly_the_same(arithmetic: str) -> None:
-    """With two branches, nine tenths of the samples stay within the rounding bound of a single branch."""
+    """With two branches, nine tenths of the samples are within the rounding bound for a single branch."""
     one = model(CHAINS["lagging"])
     numbers, codes = compiled(one, arithmetic)
     given, exact = record(numbers, codes, 5, 0.5)
@@ -381,7 +381,7 @@ int main(int count, char **given)
 
 
 def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int) -> tuple[Any, Any]:
-    """Calls in random order; codes are random, near 0 or the ends, at either end, or those of a random walk."""
+    """Calls in random order; codes are random, near 0 or the ends, at either end, or from a random walk."""
     op = rng.choice(kinds, n).astype(np.uint8)
     op[rng.random(n) < 0.0005] = slots.OP_INIT
     info = np.iinfo(real)
@@ -400,7 +400,7 @@ def checked(
     folder: Path, one: Model, arithmetic: str, flags: list[str], wrong: str = ""
 ) -> Iterator[tuple[str, Array, Array, subprocess.CompletedProcess[bytes]]]:
     """For each operator: its name, random calls, their arguments, and the run of the compiled C with the checks of
-    `granted_states`; `wrong` names a bound to be reduced to a 64th, so that a check fails."""
+    `granted_states`; `wrong` names a bound to be divided by 64, so that a check fails."""
     own, n = one.name, 20_000
     options = emit_options(one, "inverse" if own in INVERSE_ALONE else "both", arithmetic, "loop")
     written = sources.write(folder, one, options)
@@ -426,7 +426,7 @@ PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 @pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """States stay within the ranges that their formats were chosen for and that the proof takes for granted."""
+    """States stay within the ranges for which their formats were chosen and which the proof assumes."""
     one, real = model(PROVED[name]), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, "loop")
     flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
@@ -454,7 +454,7 @@ def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_pat
 @BOTH
 @pytest.mark.parametrize("name", ["everything", "worn", "quick", "warm"])
 def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run in Python's own integers, every factor of a product stays below 2^51 and every sum below 2^63."""
+    """In Python integers, every factor of a product stays below 2^51 and every sum below 2^63."""
     one = model(CHAINS[name])
     numbers = one.tables(arithmetic, "loop")
     inverse = name in INVERSE_ALONE
@@ -499,7 +499,7 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
 @BOTH
 @pytest.mark.parametrize("name", STILL)
 def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
-    """With creep alone, the drive stops changing once within rounding; behind a lag a code either way may remain."""
+    """With creep alone, the drive comes to rest within rounding; with a lag it may still vary by a code either way."""
     one = model(chain("still", *STILL[name]))
     numbers, _ = compiled(one, arithmetic)
     low, high = (int(end) for end in numbers.tables.limits.output[0])
@@ -513,7 +513,7 @@ def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
 
 
 def test_a_drift_is_counted_without_rounding() -> None:
-    """Drifts that turn, stop or hardly move agree with exact fractions, up to the sample where the clock stops."""
+    """Drifts that reverse, stop or hardly move agree with exact fractions up to the sample at which the clock stops."""
     rng = np.random.default_rng(0)
     for _ in range(200):
         rate = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6, -1))
@@ -554,7 +554,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
 
 @BOTH
 def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
-    """Whatever drive was committed, the next reference is reached to within the forward bound and one drive code."""
+    """The next reference is reached to within the forward bound and one drive code, whatever drive was committed."""
     one = model(CHAINS["creeping"])
     numbers, codes = compiled(one, arithmetic)
     rng = np.random.default_rng(3)
@@ -624,8 +624,8 @@ def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) ->
 @BOTH
 @pytest.mark.parametrize(("exponent", "ratio"), [(2.5, 5.0), (0.5, 2.0), (3.0, 2.0**28), (1.5, 0.1)])
 def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, arithmetic: str) -> None:
-    """Stretches over all decades yield as the exact law does, to a thousandth, a step, what the table's least stretch
-    yields, and 2^-40 of the stretch. No stretch yields more than itself."""
+    """Stretches of all sizes yield as the exact law does, to within a thousandth, a step, the yield of the table's
+    smallest stretch, and 2^-40 of the stretch. No stretch yields more than its length."""
     text = f"name: rate_dependence, shape: relaxation, time_constant: {ratio * T}, exponent: {exponent}"
     one = model(chain("yields", text))
     numbers, codes = compiled(one, arithmetic)
@@ -664,7 +664,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
     state = verbs.memory(t, np.int64)
     rng = np.random.default_rng(bits)
     steps = rng.integers(-largest // 50, largest // 50, 2000)
-    v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops hardly rub
+    v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops cause hardly any friction
     v = np.abs((v + largest) % (4 * largest) - 2 * largest) - largest
     v[1000:] = v[1000]
     rate, heated = Fraction(row[0]), Fraction(row[1]) * Fraction(lsb) ** (2 - rubs)
@@ -684,7 +684,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
             worst = max(worst, abs(int(state.block.high[0]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each
         assert worst <= one.error < 0.1 * peak / 2**100
-        warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # even from there the state stays within what proofs assume
+        warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # the state then stays in the range that proofs assume
         state.block.high[0] = warmest
         verbs.move(t, state, 0, np.int64(-largest), np.int64(largest))
         assert 0 <= state.block.high[0] <= warmest
@@ -695,7 +695,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
 def test_status_tells_at_either_end_that_a_saturation_has_no_input(
     arithmetic: str, level: float, centre: float
 ) -> None:
-    """The limits may lie around any output, even both on one side of 0; an offset moves a reference past them."""
+    """The limits may lie around any output, even on the same side of 0; an offset moves a reference past them."""
     one = model(chain("limited", f"name: saturation, level: {level:g}, centre: {centre:g}"))
     numbers = tables.build(one.chain, arithmetic, T)
     scale = 1.0 if numbers.codes is None else 1.0 / float(numbers.codes.output_lsb)
@@ -714,7 +714,7 @@ def test_status_tells_at_either_end_that_a_saturation_has_no_input(
 @BOTH
 @pytest.mark.parametrize("options", [{"resonance": "notch"}, {"resonance": "shaper"}, {"noise_gain": 4.0}])
 def test_weights_of_the_reference_stay_within_bounds_and_come_to_rest(arithmetic: str, options: dict[str, Any]) -> None:
-    """Answers are those of float64 tables with the same weights; after a step of the reference nothing moves on."""
+    """Answers are those of float64 tables with the same weights; after a step of the reference, all comes to rest."""
     one = model(chain("weighed", "name: resonance, frequency: 30, damping: 0.05"))
     how = Compensation(**options)
     numbers, double = (tables.build(one.chain, each, T, how) for each in (arithmetic, "float64"))

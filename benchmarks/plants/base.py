@@ -1,12 +1,12 @@
-"""Base hysteresis of the plants: four kinds that a fine play sum can represent, none of them computed as one.
+"""Base hysteresis of the plants: four kinds, which a fine play sum can represent but none of which is computed as one.
 
 Every kind starts from a continuous density p(r) of half widths, scaled to a wanted loop width:
 
 * `everett`: the continuous operator itself, evaluated by its branch function B(d) = p0 d + int p(r) max(d - 2r, 0) dr
   on a stack of reversals that are removed as they are passed;
-* `maxwell`: some hundred parallel spring-slider elements with random yield points and stiffnesses;
-* `relays`: a lattice of two-state relays, in which every half width has its own, shifted row of centres;
-* `bouc_wen`: `maxwell` with a small share of a Bouc-Wen variable, which no play sum represents exactly.
+* `maxwell`: some hundred parallel spring-slider elements with random yield points and stiffnesses; * `relays`: a
+lattice of two-state relays, in which every half width has its own shifted row of centres; * `bouc_wen`: `maxwell` with
+a small fraction of a Bouc-Wen variable, which no play sum represents exactly.
 
 `relays` can depend on the centre and `maxwell` can have nonlinear springs (not congruent); `maxwell` sliders can be
 viscous (rate dependent).
@@ -30,7 +30,7 @@ LEAST_P0_SHARE = 0.25
 ROWS = 160
 """Rows of relays, one per half width."""
 COLUMNS = 1500
-"""Relays in a row over the drive span."""
+"""Number of relays in a row across the drive span."""
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class Base:
     high: float
     p0: float
     radii: Array
-    """Half widths at the middle of the cells of the density."""
+    """Half widths in the middle of the density's cells."""
     masses: Array
-    """Weight of each cell, the sum of masses and p0 being the slope after a long move."""
+    """Weight of each cell; the masses and p0 add up to the slope after a long move."""
     yields: Array = field(default_factory=lambda: np.empty(0))
     stiffnesses: Array = field(default_factory=lambda: np.empty(0))
     phases: Array = field(default_factory=lambda: np.empty(0))
     bouc_wen: tuple[float, float, float, float] = (0.0, 1.0, 0.5, 1.0)
-    """Share in output per input, saturation length, ratio gamma/beta, exponent."""
+    """Contribution in output per input, saturation length, ratio gamma/beta, exponent."""
 
     @property
     def span(self) -> float:
@@ -79,7 +79,7 @@ def draw(rng: np.random.Generator, low: float, high: float, span_out: float, kin
     mean = float(masses @ radii)
     width = rng.uniform(0.02, 0.15)
     most = 1.0 / LEAST_P0_SHARE - 1.0
-    # Loop width over output range, 2 c mean / (span + c (span - 2 mean)), solved for the total weight c beside p0 = 1
+    # Loop width over output range, 2 c mean / (span + c (span - 2 mean)), solved for the total weight c if p0 = 1
     below = 2.0 * mean * (1.0 + width) - width * span
     total = min(width * span / below, most) if below > 0.0 else most
     out = span * (1.0 + total) - 2.0 * total * mean
@@ -101,7 +101,7 @@ def draw(rng: np.random.Generator, low: float, high: float, span_out: float, kin
 
 
 def spread(base: Base, rows: int) -> tuple[Array, Array]:
-    """The density as `rows` half widths of equal weight, with that weight."""
+    """The density as `rows` half widths of equal weight, and that weight."""
     cumulative = np.cumsum(base.masses)
     total = float(cumulative[-1])
     wanted = (np.arange(rows) + 0.5) / rows * total
@@ -134,7 +134,7 @@ class Centre:
 
 
 def run(base: Base, v: Array, dt: Array, viscosity: Viscosity | None = None, centre: Centre | None = None) -> Array:
-    """Output for a drive `v` with time steps `dt` (dt[0] is ignored), which starts as if it came from far below."""
+    """Output for a drive `v` with time steps `dt` (dt[0] is ignored), starting as if the drive came from far below."""
     if viscosity is not None:
         return _run_viscous(base, v, dt, viscosity)
     if centre is not None:
@@ -219,7 +219,7 @@ def _run_relays(base: Base, v: Array, centre: Centre | None) -> Array:
 @njit(cache=True)
 def _relays(v: Array, radii: Array, origin: Array, pitch: float, totals: Array) -> Array:
     rows, most = totals.shape[0], totals.shape[1] - 1
-    # in a row of equal widths, the relays that are up are always those with the lowest centres
+    # in a row of equal widths, the relays with the lowest centres are always the ones that are up
     up = np.zeros(rows, np.int64)
     out = np.empty(len(v))
     for k in range(len(v)):
@@ -237,7 +237,7 @@ def _relays(v: Array, radii: Array, origin: Array, pitch: float, totals: Array) 
 
 @njit(cache=True)
 def _sliders(v: Array, yields: Array, stiffnesses: Array) -> Array:
-    """Weighted slip of the sliders, on springs of `stiffnesses` that v less the slip stretches."""
+    """Weighted slip of the sliders, on springs of `stiffnesses` that are stretched by v minus the slip."""
     stretch = yields.copy()
     out = np.empty(len(v))
     for k in range(len(v)):
@@ -298,7 +298,7 @@ def _viscous(
             excess = abs(e) - yields[i]
             if excess > 0.0:
                 if exponent == 1.0:
-                    # Excess of a ramp: exact for one that is linear within the step
+                    # Excess of a ramp: exact for a ramp that is linear within the step
                     excess *= decay[i]
                 else:
                     # x' = -(unit/tau)(x/unit)^m has a closed solution
@@ -355,7 +355,7 @@ def _bent(v: Array, yields: Array, stiffnesses: Array, strength: float, middle: 
             s = min(max(slip[i], v[k] - yields[i]), v[k] + yields[i])
             slip[i] = s
             x = (s - middle) / width
-            # wide elements bend more, so that no function of the sum gives the same
+            # wide elements bend more, so that no function of the sum gives the same output
             bend = strength * min(yields[i] / mean, 2.0)
             total += stiffnesses[i] * (s + bend * width * (math.sqrt(1.0 + x * x) - 1.0))
         out[k] = total

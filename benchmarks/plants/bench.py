@@ -1,4 +1,4 @@
-"""Test benches: drive range, travel, sampling and length of the records that a user would take on them."""
+"""Test benches: drive range, travel, sampling and length of the records that a user would take there."""
 
 from __future__ import annotations
 

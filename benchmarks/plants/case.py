@@ -24,19 +24,19 @@ REPORT = 10_000
 """First seed of the report block."""
 
 NOISE = (2.0e-4, 2.0e-3)
-"""Noise rms as a share of the output range: least, most."""
+"""Noise rms as a fraction of the output range: smallest, largest."""
 
 PURE = 0.25
-"""Largest rms that a fine play sum may leave of an effect-free plant, in units of the noise."""
+"""Largest rms residual of a fine play sum fitted to a plant without effects, in units of the noise."""
 
 VISIBLE = 3.0
-"""Least rms left of an effect, in units of the noise, for its name to be required."""
+"""Smallest rms residual due to an effect, in units of the noise, for its name to be required."""
 
 SHOWN = 0.5
-"""Share of the strength that the held-out records and the records to fit each have to show."""
+"""Fraction of the strength that the held-out records and the records to fit must each show."""
 
 CLOSE = 0.25
-"""Largest log of the ratio between the wanted and the achieved strength."""
+"""Largest logarithm of the ratio between the wanted and the achieved strength."""
 
 SMALL, LARGE = 1300, 5200
 """Samples per record."""
@@ -54,13 +54,13 @@ MOST = {
 """Largest strength that an effect of a real stage has; 20 for effects not listed."""
 
 LEAST = {"resonance": 0.6, "slew_limit": 0.6, "delay": 0.3, "lag": 0.3}
-"""Least strength at which the samples of the bench resolve an effect."""
+"""Smallest strength at which the bench's samples resolve an effect."""
 
 
 @dataclass(frozen=True)
 class Present:
-    """An effect of the plant, and the rms that it leaves by itself after a refit of a fine play sum [output], in all
-    records and in the held-out ones; `to_fit`: in the others, after a refit to only these."""
+    """An effect of the plant, and the rms residual that it alone causes after a fine play sum is refitted [output], in
+    all records and in the held-out ones; `to_fit`: in the others, after a refit to only these."""
 
     effect: Effect
     unabsorbed: float
@@ -74,7 +74,7 @@ class Case:
 
     `clean`: noise-free output of the plant for each record, before any foreign fault; `twin`: the same for the plant
     without its effects; `measured`: columns of each record by name; `added`: error that the converters added to
-    `clean`; `unabsorbed`, `remainder`: rms left by a fine play sum with and without the effects.
+    `clean`; `unabsorbed`, `remainder`: rms residual of a fine play sum with and without the effects.
     """
 
     kind: str
@@ -96,18 +96,18 @@ class Case:
 
     @property
     def name(self) -> str:
-        """A name that tells nothing about the content of the case."""
+        """A name that reveals nothing about the content of the case."""
         return "case_" + hashlib.sha256(f"{self.kind}:{self.seed}".encode()).hexdigest()[:10]
 
     def noise(self, held_out: bool | None = None) -> float:
-        """Rms error of the converters [output] without any fault: of the held-out records, of the others, or of all."""
+        """Rms error of the converters [output] without any fault, over the held-out records, the others, or all."""
         rows = [k for k, r in enumerate(self.session.records) if held_out is None or r.held_out == held_out]
         return float(np.sqrt(np.mean(np.concatenate([self.added[k] for k in rows]) ** 2)))
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """Parameters of the model given to the workflow: about right, from the plant without effects."""
+    """Parameters of the model given to the workflow: roughly right, from the plant without effects."""
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -115,7 +115,7 @@ class Nominal:
 
 
 def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Given] = ()) -> Case:
-    """The case of a kind and seed; about `samples` per record; `given`: drives to take as they are."""
+    """The case of a kind and seed, with about `samples` per record; `given`: drives to be used unchanged."""
     streams = [
         np.random.Generator(np.random.PCG64(s))
         for s in np.random.SeedSequence([KINDS.index(kind), seed, samples]).spawn(6)
@@ -247,7 +247,7 @@ def _effects(
     noise: float,
     remainder: float,
 ) -> tuple[list[Present], float]:
-    """Effects with strengths of real stages, with noise and strength adjusted to a wanted ratio of the two."""
+    """Effects of realistic strength, with noise and strength adjusted to a wanted ratio."""
     least = max(NOISE[0] * stage.bench.span_out, remainder / PURE)
     most = max(NOISE[1] * stage.bench.span_out, least)
     present: list[Present] = []
@@ -277,7 +277,7 @@ def _alone(stage: session.Session, course: refit.Track, hysteresis: base.Base, e
 
 
 def _off(item: Present, wanted: float) -> float:
-    """How far the strength is from the wanted one; held-out records, and those to fit, have to show half of it."""
+    """Log distance from the wanted strength; the held-out records and the records to fit must each show half of it."""
     shown = min(item.held_out, item.to_fit)
     return max(abs(math.log(item.unabsorbed / wanted)), math.log(SHOWN * wanted / shown))
 
@@ -299,7 +299,7 @@ def _scaled(
 
 
 def _logs_temperature(rng: np.random.Generator, stage: session.Session, present: list[Present]) -> bool:
-    # Some benches log it though nothing follows it
+    # Some benches log it although nothing depends on it
     decoy = bool(rng.uniform() < 0.25) and stage.bench.kind == "static"
     return decoy or any(item.effect.form == "room" for item in present)
 
@@ -322,7 +322,7 @@ def _nominal(rng: np.random.Generator, course: refit.Track, output: Array, span:
     weights = np.maximum(weights, 0.0)
     thresholds = thresholds * rng.uniform(0.97, 1.03)
     offset = float(np.mean(output) - np.mean(columns @ weights))
-    # Rounded for the file, two thresholds may be equal
+    # Two thresholds may become equal when rounded for the file
     written, first = np.unique([float(f"{x:.5g}") for x in thresholds], return_index=True)
     weights = np.add.reduceat(weights, first)
     return Nominal(tuple(written.tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}"))

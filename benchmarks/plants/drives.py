@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Drive = Callable[[np.random.Generator, Array, float, float], Array]
-"""Function of a random generator, the time in the record from 0 to 1, the start value, and a sample's share of the
+"""Function of a random generator, the time in the record from 0 to 1, the start value, and a sample's fraction of the
 time."""
 
 
 def path(t: Array, sample: float, points: list[tuple[float, float]]) -> Array:
-    """Piecewise linear through (duration share, value); durations are scaled to fill the record.
+    """Piecewise linear through (relative duration, value); durations are scaled to fill the record.
 
     Corners lie in the middle of a sample, as with a generator that shares the converters' clock.
     """
@@ -29,7 +29,7 @@ def path(t: Array, sample: float, points: list[tuple[float, float]]) -> Array:
 
 
 def _swings(start: float, turns: list[float], pace: float = 0.0) -> list[tuple[float, float]]:
-    """Points through `turns` at one speed."""
+    """Points of a path through `turns` at constant speed."""
     points = [(0.0, start)]
     for turn in turns:
         points.append((max(abs(turn - points[-1][1]), 1e-3), turn))

@@ -24,7 +24,7 @@ class Scene:
 
 
 Fault = Callable[[np.random.Generator, list[Scene], list[Array], list[Array]], dict[str, float]]
-"""Changes the measured columns v and y of the records in place and returns its numbers for the label."""
+"""Function that changes the measured columns v and y in place and returns the fault's parameters for the label."""
 
 
 def hum(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: list[Array]) -> dict[str, float]:
@@ -57,7 +57,7 @@ def held_samples(rng: np.random.Generator, scenes: list[Scene], v: list[Array], 
 
 
 def stick_slip(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: list[Array]) -> dict[str, float]:
-    """A guide that sticks until the actuator is ahead by a distance, different each time, then jumps after it."""
+    """A guide that sticks until the actuator is some distance ahead, different each time, and then jumps after it."""
     size = scenes[0].noise * _between(rng, 8.0, 30.0)
     jumps = 0
     for scene, seen in zip(scenes, y, strict=True):
@@ -80,7 +80,7 @@ def ripple(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: lis
 
 
 def full_scale(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: list[Array]) -> dict[str, float]:
-    """A converter at its last code: every sample beyond it reads exactly the same."""
+    """A converter at its last code: every sample beyond it reads exactly that value."""
     top = float(max(scene.y.max() for scene in scenes)) - scenes[0].span_out * rng.uniform(0.03, 0.15)
     for seen in y:
         np.minimum(seen, top, out=seen)

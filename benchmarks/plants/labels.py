@@ -124,12 +124,12 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
 
 
 def _visible(effect: dict[str, Any]) -> bool:
-    """Whether an effect of a label is strong enough, and not only in the held-out records."""
+    """Whether an effect of a label is strong enough, also outside the held-out records."""
     return bool(effect["ratio"] >= VISIBLE and effect["ratio_fit"] >= SHOWN * VISIBLE)
 
 
 def compared(case: Case, plant: Plant) -> dict[str, float]:
-    """Held-out rms of every name's simple form on a plant with the case's noise, relative to that of the true form."""
+    """Held-out rms of each name's simple form on a plant with the case's noise, relative to that of the true form."""
     stage = case.session
     fine = plant.respond(stage)
     noise = np.concatenate(case.added)
@@ -150,7 +150,7 @@ def compared(case: Case, plant: Plant) -> dict[str, float]:
 
 
 def _own_times(course: refit.Track) -> np.ndarray[Any, Any]:
-    """Time that restarts with every record; between records it does not matter."""
+    """Time that restarts with every record; its values between records do not matter."""
     first = {number: course.t[np.argmax(course.record == number)] for number in np.unique(course.record).tolist()}
     return course.t - np.array([first[number] for number in course.record.tolist()])
 

@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FINE = 48
-"""Plays of the sum that defines the unabsorbed part."""
+"""Number of plays in the sum that defines the unabsorbed part."""
 
 RIDGE = 1e-9
 
 STILL = 1e-9
-"""A play that moves by less than this share of the largest movement gets no weight."""
+"""A play that moves by less than this fraction of the largest movement gets no weight."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ def plays(v: Array, radii: Array) -> Array:
 
 
 def radii(span: float, number: int) -> Array:
-    """Half widths from 0 to half the span, denser at small ones."""
+    """Half widths from 0 to half the span, denser near 0."""
     x = np.linspace(0.0, 1.0, number)
     return np.asarray(0.5 * span * (0.35 * x + 0.65 * x * x) * (1.0 - 1e-6))
 
 
 def centred(columns: Array, record: Ints) -> Array:
-    """Columns less their mean over each record, whose samples are contiguous: a free offset per record."""
+    """Columns minus their mean over each record, whose samples are contiguous: a free offset per record."""
     starts = np.concatenate(([0], np.flatnonzero(np.diff(record)) + 1))
     counts = np.diff(np.append(starts, len(record)))
     means = np.add.reduceat(columns, starts, axis=0).T / counts
@@ -109,7 +109,7 @@ class Left:
 
 
 def unabsorbed(course: Track, output: Array, span: float) -> Left:
-    """The part of an output (seen samples) that a fine play sum leaves."""
+    """The residual of a fine play sum fitted to an output (seen samples)."""
     record = course.record[course.seen]
     columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
     y = centred(output, record)

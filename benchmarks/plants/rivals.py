@@ -1,4 +1,4 @@
-"""The other names that a record leaves open: the plant refitted with every catalogue form, judged on held-out records.
+"""Names that the records cannot exclude: the plant refitted with every catalogue form, judged on held-out records.
 
 For each effect by itself on its base hysteresis, with the noise of the case, a simple form of each catalogue name is
 fitted to the fit records jointly with a play sum and an offset per record. So is the true form: the play sum on the
@@ -26,14 +26,14 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 ALIKE = 1.05
-"""Ratio of held-out rms up to which two forms count as not separable."""
+"""Largest ratio of the held-out rms of two forms that count as not separable."""
 
 PLAYS = 24
 
 
 @dataclass(frozen=True)
 class Data:
-    """A course with a measured output (seen samples); `clock`: the time in the records, at every sample."""
+    """A course with a measured output (seen samples); `clock`: the time within the record, at every sample."""
 
     course: refit.Track
     clock: Array
@@ -75,7 +75,7 @@ def compared(data: Data, twin: Array) -> dict[str, float]:
 
 
 def held_out_rms(data: Data, columns: Columns, y: Array) -> float:
-    """Fit to the fit records, rms on the held-out ones with a free offset each."""
+    """Fit to the fit records, then rms error on the held-out ones with a free offset each."""
     return _judge(data, columns, y)[1]
 
 
@@ -135,9 +135,9 @@ def _lag(data: Data, x: Array) -> Array:
 
 
 def _delayed(straight: bool) -> Form:
-    """Delays the plays instead of the drive: they remember corners, which a drive delayed by a part of a sample misses.
+    """Delays the plays instead of the drive: they remember corners that fall between the samples of a delayed drive.
 
-    Between samples, straight lines suit steep edges, and Akima's curves suit sines.
+    Between samples, straight lines suit steep edges, and Akima curves suit sines.
     """
 
     def form(data: Data, x: Array) -> Columns:
@@ -184,7 +184,7 @@ def _bent(data: Data, x: Array) -> Array:
 
 
 def _stops(data: Data, x: Array) -> Columns:
-    """Bends of the output at a share of its range below the top and, on a two-sided bench, above the bottom."""
+    """Bends of the output at a fraction of its range below the top and, on a two-sided bench, above the bottom."""
     columns = _plays(data, data.course.v)
     h = _predicted(data, columns)
     cut = float(x[0]) * float(np.ptp(h))
@@ -196,7 +196,7 @@ def _stops(data: Data, x: Array) -> Columns:
 
 @njit(cache=True)
 def _moving_plays(v: Array, dt: Array, radii: Array, growth: float, tau: float) -> Array:
-    """Thresholds r (1 + growth |v'|), or plays that follow with a time constant."""
+    """Plays with thresholds r (1 + growth |v'|), or plays that follow with a time constant."""
     out = np.empty((len(v), len(radii)))
     for i in range(len(radii)):
         s = v[0] - radii[i]
@@ -264,7 +264,7 @@ def _predicted(data: Data, columns: Array) -> Array:
     matrix = refit.centred(columns, record)
     weights = refit.fit(matrix[fitted], refit.centred(data.y, record)[fitted])
     h = columns @ weights
-    # zero drive gives about zero output: a gain acts relative to that
+    # zero drive gives about zero output, relative to which a gain acts
     return np.asarray(h - h.mean() + 0.5 * (data.low + data.high) * np.ptp(h) / data.span)
 
 
@@ -339,10 +339,10 @@ def _aged(shape: Callable[[Array], Array]) -> Form:
 
 
 def _sensed(data: Data, _: Array) -> Columns:
-    """Powers of the measured output beside the plays: y + c_2 y^2 + .. = PI."""
+    """Powers of the measured output, fitted together with the plays: y + c_2 y^2 + .. = PI."""
     columns = _plays(data, data.course.v)
     h = _predicted(data, columns)
-    half = 0.5 * float(np.ptp(data.y))  # a sum fitted to nothing but drift need not move
+    half = 0.5 * float(np.ptp(data.y))  # a sum fitted only to drift may not move at all
     z = (data.y - _record_means(data, data.y) + _record_means(data, h) - h.mean()) / half
     return np.column_stack((columns, half * z**2, half * z**3, half * z**4)), 3
 

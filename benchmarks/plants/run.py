@@ -1,6 +1,6 @@
-"""Have every case diagnosed through the package's command line, the only connection to the package beside `track`.
+"""Diagnose every case through the package's command line; only this module and `track` call the package.
 
-Each case is copied to a folder of its own before the command sees it, so that no label is near it.
+Each case is first copied to a separate folder, so that the command cannot see any label.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def diagnose(case: Path, results: Path, limit: float, command: Sequence[str] = C
 
 
 def run(cases: Path, results: Path, jobs: int, limit: float) -> int:
-    """Run every case that has no result yet; returns the number of those that ended with an error."""
+    """Run every case that has no result yet; returns the number of cases that ended with an error."""
     todo = [case for case in sorted(cases.iterdir()) if not (results / case.name / "run.json").is_file()]
     failed = 0
     with ThreadPoolExecutor(jobs) as pool:

@@ -1,4 +1,4 @@
-"""Count how often the diagnosis was right, by labels that it has not seen.
+"""Count how often the diagnosis was right, according to labels that it has not seen.
 
 A name counts as right if it is the effect's, or if the label calls it indistinguishable on the given records and the
 diagnosis reports it as not separable from the effect's own. Reporting two names as not separable does not excuse the
@@ -48,14 +48,14 @@ class Outcome:
         return [set(group) for group in self.found.get("not_separable", [])] if self.found else []
 
     def accepts(self, effect: dict[str, Any], name: str) -> bool:
-        """Whether `name` is a right answer to an effect of the label."""
+        """Whether `name` is a correct answer for an effect of the label."""
         if name == effect["name"]:
             return True
         alike = {effect["name"], *effect["indistinguishable"]}
         return name in alike and any({name, effect["name"]} <= group <= alike for group in self.groups)
 
     def left_open(self, effect: dict[str, Any]) -> bool:
-        """Nothing was named, but the effect was reported as not separable from names, and it really is not."""
+        """Nothing was named, but the effect was correctly reported as not separable from other names."""
         alike = {effect["name"], *effect["indistinguishable"]}
         return not self.names and any(effect["name"] in group <= alike and len(group) > 1 for group in self.groups)
 
@@ -83,7 +83,7 @@ class Outcome:
 
     @property
     def wrong(self) -> list[str]:
-        """Names that belong to no effect of the plant."""
+        """Names that are correct for no effect of the plant."""
         return [name for name in self.names if not any(self.accepts(e, name) for e in self.label["effects"])]
 
     @property
@@ -205,7 +205,7 @@ def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
 
 
 def asides(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """Shares without a limit, which show whether limits are kept only by naming nothing or by leaving all open."""
+    """Fractions without a limit, which show whether limits are met only by naming nothing or leaving all open."""
     singles = _of(outcomes, "single", visible=True)
     pairs = _of(outcomes, "pair", visible=True)
     poor = _of(outcomes, "poor")
@@ -224,7 +224,7 @@ def asides(outcomes: Sequence[Outcome]) -> dict[str, float]:
 
 
 def curve(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """Naming rate of single effects with rich excitation against unabsorbed rms over noise."""
+    """Naming rate of single effects with rich excitation, against the ratio of unabsorbed rms to noise."""
     some = [*_of(outcomes, "single"), *_of(outcomes, "snr")]
     rows = []
     for low, high in pairwise(EDGES):
@@ -327,7 +327,7 @@ def _case_text(x: Outcome) -> str:
 
 
 def _matrix(table: dict[str, Counter[str]]) -> list[str]:
-    """Rows: truth. Columns: first name, by letters that a legend explains, so that a line stays short."""
+    """Rows: truth. Columns: first name, as letters explained in a legend, which keeps lines short."""
     names = sorted(catalogue())
     seen = {column for counts in table.values() for column in counts}
     columns = [x for x in (*names, ALIKE, UNEXPLAINED, NOTHING, "refused", MISSING) if x in seen]

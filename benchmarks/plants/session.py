@@ -22,8 +22,8 @@ FINER = 8
 
 @dataclass(frozen=True)
 class Planned:
-    """One record: waveform by name, held out or not, its rate [1/s], and its samples on the fine grid, which are
-    FINER steps each from fine index `first` on."""
+    """One record: its waveform's name, whether it is held out, its rate [1/s], and its samples of FINER fine steps
+    each, starting at fine index `first`."""
 
     waveform: str
     held_out: bool
@@ -48,7 +48,7 @@ class Session:
     rest: float | None
     temperature: Array
     aperture: int
-    """Fine steps in the middle of a sample over which both converters average."""
+    """Number of fine steps, in the middle of a sample, over which both converters average."""
 
     @property
     def dt(self) -> Array:
@@ -128,7 +128,7 @@ def read_drives(folder: Path, held_out: Container[str]) -> list[Given]:
 
 
 def replayed(rng: np.random.Generator, span_out: float, given: Sequence[Given]) -> Session:
-    """Given drives as they are, with rests between them; top and bottom are visited before the first."""
+    """Given drives unchanged, with rests between them; the top and the bottom are visited before the first."""
     low, high = min(float(each.v.min()) for each in given), max(float(each.v.max()) for each in given)
     steps = [float(np.median(np.diff(each.t))) for each in given]
     rates = (1.0 / max(steps), 1.0 / min(steps))
@@ -152,7 +152,7 @@ def replayed(rng: np.random.Generator, span_out: float, given: Sequence[Given]) 
 
 
 def rich(rng: np.random.Generator, records: int) -> Waveforms:
-    """Waveforms that can show every effect of the bench; the held-out ones are anywhere but at the very start."""
+    """Waveforms that can show every effect of the bench; the held-out ones are anywhere except at the very start."""
     names = list(drives.FIT)
     fit = [(name, drives.FIT[name], False) for name in names[: max(records - 3, 5)]]
     fit = [fit[k] for k in rng.permutation(len(fit))]
@@ -165,7 +165,7 @@ def rich(rng: np.random.Generator, records: int) -> Waveforms:
 
 
 def poor(rng: np.random.Generator) -> Waveforms:
-    """One waveform at one speed and size, repeated: one sine, or one slow triangle."""
+    """One waveform at one speed and amplitude, repeated: a sine, or a slow triangle."""
     if rng.uniform() < 0.6:
         waveform = drives.sine(round(rng.uniform(4.0, 9.0)), rng.uniform(0.25, 0.5))
         name = "sine"

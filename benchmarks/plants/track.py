@@ -1,11 +1,11 @@
-"""Closed simulation: the plants of the cases behind compensators that the package makes from their records.
+"""Closed simulation: the plants of the cases, driven by compensators that the package makes from their records.
 
 Records, `identify`, `diagnose`, and the inverse of both models, as the emitted C computes it (`simulate --arithmetic
-float32`, whose bits `verify` holds the C to), turn a reference that is in no record into a drive; the plant answers
-that drive on its own fine grid. Everything of the package is called through its command line.
+float32`, whose bits `verify` holds the C to), turn a reference that is in no record into a drive; the plant responds to
+it on its own fine grid. The package is called only through its command line.
 
-What is printed is the rms error about its mean, in per cent of the reference's range, of a straight line, of the plays
-that `identify` finds, and of the model that `diagnose` writes, with the ratio of the last two.
+It prints the rms error about its mean, in per cent of the reference's range, of a straight line, of the plays that
+`identify` finds, and of the model that `diagnose` writes, and the ratio of the last two.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ EFFECTS = (
     "creep", "lag", "rate_dependence", "asymmetry", "saturation", "resonance", "delay", "noncongruent", "slew_limit",
     "ageing", "thermal",
 )  # fmt: skip
-"""Tracked effects; not drift, which needs a clock, nor a sensor's nonlinearity, which is no error of the stage."""
+"""Tracked effects: all but drift, which needs a clock, and sensor nonlinearity, which is not an error of the stage."""
 
 PAIRS = "pairs"
 """Plants with two effects."""
@@ -48,18 +48,18 @@ LENGTH, SWEEP = 3000, 400
 """Samples of a reference, and of one sweep over its range; the first two sweeps do not count."""
 
 SLOWEST = 60
-"""Samples of the fastest half wave of a reference."""
+"""Samples in the fastest half wave of a reference."""
 
 GOOD = 2.0, 0.05
-"""A good compensator leaves at most this multiple of the held-out residual, or this many per cent."""
+"""The error of a good compensator is at most this multiple of the held-out residual, or this many per cent."""
 
 INSIDE = 0.1
-"""Distance of a reference from the ends of the output, as a share of the output over the range of the drive."""
+"""Distance of a reference from the ends of the output, as a fraction of the output's range over the drive range."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """Errors left on one plant, rms in per cent of the reference's range; `named`: whether its effects were named."""
+    """Residual errors on one plant, rms in % of the reference's range; `named`: whether its effects were named."""
 
     effect: str
     seed: int
@@ -104,7 +104,7 @@ def reference(rng: np.random.Generator, low: float, high: float) -> Array:
 
 
 def rooms(case: Case) -> Array:
-    """Temperature along a reference: three waves over the range of the records, beginning where these began."""
+    """Temperature along a reference: three waves over the records' temperature range, from their first temperature."""
     seen = case.session.temperature
     low, high = float(seen.min()), float(seen.max())
     level = 2.0 * (seen[0] - low) / (high - low) - 1.0 if high > low else 0.0
@@ -113,8 +113,8 @@ def rooms(case: Case) -> Array:
 
 
 def answer(case: Case, drive: Array, room: Array, rate: float) -> Array:
-    """Output of the plant for each sample of a drive, at a room temperature, from rest at the first value."""
-    held = np.full(LENGTH, drive[0])  # ringing at the start has decayed after these
+    """Output of the plant for each sample of a drive and room temperature, from rest at the first value."""
+    held = np.full(LENGTH, drive[0])  # ringing at the start has decayed after these samples
     drive, room = np.concatenate([held, drive]), np.concatenate([np.full(LENGTH, room[0]), room])
     n = len(drive)
     before = np.geomspace(1e-4, 1.0, 50) * 5.0 * max(case.session.bench.long, n / rate)
@@ -129,7 +129,7 @@ def answer(case: Case, drive: Array, room: Array, rate: float) -> Array:
 
 
 def plant(effect: str, seed: int, samples: int = SMALL) -> Case:
-    """The case of one effect, or of a pair of them; `seed` counts within the block of reports."""
+    """The case of one effect, or of a pair of them; `seed` counts within the report block."""
     if effect == PAIRS:
         fits = (k for k in itertools.count(REPORT) if set(contents("pair", k)[0]) <= set(EFFECTS))
         return make("pair", next(itertools.islice(fits, seed, None)), samples)
@@ -158,7 +158,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         outputs = np.concatenate([columns["y"] for columns in case.measured])
         drives = np.concatenate([columns["v"] for columns in case.measured])
         stand = case.session.bench
-        # a line fit at the ends of the drive: a ringing stage goes further, but no drive can hold it there
+        # a line fit gives the ends: a ringing stage goes further, but no drive can hold it there
         low, high = np.polyval(np.polyfit(drives, outputs, 1), [stand.low, stand.high]).tolist()
         low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
         u = reference(np.random.default_rng(seed), low, high)
@@ -170,7 +170,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         for name in ("plain", "whole"):
             with (home / f"{name}.yaml").open("a") as file:
                 file.write(f"sample_time: {1.0 / rate!r}\n")
-                heated = "thermal" in names  # which may mean self-heating by the drive
+                heated = "thermal" in names  # this may mean self-heating by the drive
                 if name == "whole":  # references here have no noise
                     asked = ", compensate: [self_heating]" * heated
                     file.write(f"emit:\n  compensation: {{noise_gain: 1.0e+9{asked}}}\n")
@@ -192,7 +192,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
 
 
 def _aligned(number: int) -> int:
-    """The seed in the report block whose effect is number `number`: cases take effects in turn from seed 0 on."""
+    """The seed in the report block for effect number `number`: from seed 0 on, cases take the effects in turn."""
     return number - REPORT % len(catalogue())
 
 

@@ -340,7 +340,7 @@ def _extended(
     if actuator.at(Place.PLAYS):  # an effect on the plays may refer to the largest threshold
         kept[-1] = True
     fewer = tuple(r[kept].tolist())
-    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has a parameter for every play
+    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has one parameter per play
         kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
     plays: dict[str, object] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}

@@ -525,7 +525,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and the change in their weighted sum with each other version."""
+    """The plays behind the first version of a front, and how each other version changes their weighted sum."""
     carried = []
     for stages in versions:
         rising, visited = _session(course, stages)

@@ -369,7 +369,7 @@ class ThresholdList:
 
     @property
     def n(self) -> int:
-        """Plays without r_0."""
+        """Number of plays without r_0."""
         return len(self.thresholds) - 1
 
 

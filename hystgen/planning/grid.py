@@ -106,10 +106,10 @@ class Tempo:
         return float(ticks * Decimal(repr(self.sample_time)))
 
     def every_of(self, share: float, samples: int) -> int:
-        """Sample times between the `samples` of a record that lasts a fraction `share` of a slow record."""
+        """Spacing, in sample times, of the `samples` of a record that lasts a fraction `share` of a slow record."""
         return max(self.fast, round(share * self.slow / samples))
 
     @property
     def middle(self) -> int:
-        """Sample times between samples halfway between fast and slow records, on a logarithmic scale."""
+        """Sample spacing, in sample times, halfway between fast and slow records on a logarithmic scale."""
         return max(self.fast, math.isqrt(self.fast * self.every_of(1.0, SLOW_SAMPLES)))

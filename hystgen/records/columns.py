@@ -410,7 +410,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """Report columns that are used for two needed columns."""
+        """Report columns of the file that are used for two needed columns."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue

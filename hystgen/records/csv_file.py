@@ -400,7 +400,7 @@ class _Body:
             if '"' in text:
                 return False
             blank = (data == ord(" ")) | (data == ord("\t")) | ends
-            # Cells are counted where they begin; with any other delimiter a line has one cell more than delimiters
+            # Between blanks, starts of cells are counted; otherwise delimiters, of which a line has one fewer
             between = ~blank & np.concatenate([[True], blank[:-1]])
             extra = 1
         else:

@@ -91,7 +91,7 @@ class Shown:
 
         Second differences remove the smooth part of a residual and leave the noise times the square root of 6 (Gasser,
         Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). The estimates from adjacent samples and from every
-        other sample agree only if the noise is white and the rest is smooth.
+        other sample agree only if the noise is white and the rest of the residual is smooth.
         """
         found = []
         for lag in (1, 2):

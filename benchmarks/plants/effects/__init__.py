@@ -1,4 +1,4 @@
-"""The catalogue's effects written from physics: how each is drawn for a bench, and what it does on the fine grid.
+"""The catalogue's effects derived from physics: how each is drawn for a bench, and how it acts on the fine grid.
 
 `strength` scales an effect; at 0 it does nothing. `values` are its physical parameters, which the label records.
 """
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effect:
-    """One effect of a plant, by its catalogue name, and the physical form it is given here."""
+    """One effect of a plant: its catalogue name, and its physical form here."""
 
     name: str
     form: str
@@ -34,8 +34,7 @@ class Effect:
 class Surroundings:
     """Inputs of an effect: fine time and steps [s], drive [input], temperature [degC], the bench.
 
-    Strengths of effects that accumulate refer to the end of the session, or of `first` if the plant went through that
-    one.
+    Strengths of effects that accumulate refer to the end of the session, or of `first` if the plant went through that.
     """
 
     t: Array

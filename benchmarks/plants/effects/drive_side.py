@@ -1,4 +1,4 @@
-"""Between the commanded drive and the hysteresis: transport, amplifier, rails and bent field."""
+"""Effects between the commanded drive and the hysteresis: transport, amplifier, rails and bent field."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def delay(effect: Effect, x: Array, around: Surroundings) -> Array:
 
 
 def draw_slew(rng: np.random.Generator, bench: Bench) -> Effect:
-    # at strength 1 a full-scale move takes this many samples; edges of steps take three to eight
+    # at strength 1 a full-scale move takes this many samples; step edges take three to eight
     samples = between(rng, 15.0, 60.0)
     rate = bench.span * bench.rates[1] / samples
     return Effect("slew_limit", "current", 1.0, values(rising=rate, falling=rate * rng.uniform(0.7, 1.4)))

@@ -1,4 +1,4 @@
-"""Behind the actuator: its mechanics, the stage's stops, the sensor, the slow shift of the frame."""
+"""Effects behind the actuator: its mechanics, the stage's stops, the sensor, the slow shift of the frame."""
 
 from __future__ import annotations
 
@@ -85,10 +85,10 @@ def stops(effect: Effect, y: Array, around: Surroundings) -> Array:
 
 
 def _taken(beyond: Array, depth: float, give: float) -> Array:
-    """Travel that a stop takes from a stage that would go `beyond` it: at `depth`, all but the share `give`.
+    """Travel that a stop takes from a stage that would go `beyond` it: at `depth`, all but the fraction `give`.
 
-    The force on a ball grows like its indentation to the power 3/2 and is that of the stage's stiffness on the travel
-    taken; solved by bisection.
+    The force on a ball, which grows like its indentation to the power 3/2, equals the stage's stiffness times the
+    travel taken; solved by bisection.
     """
     stiffness = (1.0 - give) * depth / (give * depth) ** 1.5
     low, high = np.zeros_like(beyond), np.maximum(beyond, 0.0)

@@ -46,7 +46,7 @@ def spectrum(effect: Effect) -> tuple[Array, Array]:
     """Relaxation times [s] and their weights [1]."""
     numbers = effect.values
     if effect.form == "stretched":
-        # weights of 1 - exp(-(t/T)^b) from its slope in log t, over a range wide enough for b = 0.4
+        # weights of 1 - exp(-(t/T)^b) from its slope over log t, in a range wide enough for b = 0.4
         taus = np.geomspace(numbers["time"] * 1e-3, numbers["time"] * 30.0, SPECTRUM)
         x = (taus / numbers["time"]) ** numbers["exponent"]
         weights = numbers["exponent"] * x * np.exp(-x)
@@ -118,7 +118,7 @@ def draw_thermal(rng: np.random.Generator, bench: Bench) -> Effect:
 
 
 def thermal(effect: Effect, h: Array, around: Surroundings) -> Array:
-    """Gain and offset by the excess temperature, scaled so that the largest change of the gain is `strength`."""
+    """Gain and offset due to the excess temperature, scaled so that the largest change of the gain is `strength`."""
     peak = float(np.abs(_excess(effect, around.scale)).max())
     if peak == 0.0:
         return h
@@ -129,7 +129,7 @@ def thermal(effect: Effect, h: Array, around: Surroundings) -> Array:
 
 
 def _excess(effect: Effect, around: Surroundings) -> Array:
-    """Temperature above that at the start of the first session."""
+    """Temperature rise since the start of the first session."""
     if effect.form == "room":
         return around.temperature - around.scale.temperature[0]
     return np.asarray(_heat(around.drive, around.dt, effect.values["time"], around.bench.span))
@@ -137,7 +137,7 @@ def _excess(effect: Effect, around: Surroundings) -> Array:
 
 @njit(cache=True)
 def _heat(v: Array, dt: Array, tau: float, span: float) -> Array:
-    """Temperature above the room's, up to a factor, by the friction of three sliders on one thermal mass."""
+    """Rise above room temperature, up to a factor, due to the friction of three sliders on one thermal mass."""
     limits = span * np.array([0.03, 0.1, 0.22])
     stretch = np.zeros(3)
     heat = 0.0

@@ -194,7 +194,7 @@ def _better(swapped: Against, found: Against) -> bool:
 
 
 def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
-    """The other record whose prediction matches the output of record k where k's own does not, or None."""
+    """Another record whose prediction matches the output of record k although k's own prediction does not, or None."""
     if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
         return None
     y = np.asarray(records[k].y)

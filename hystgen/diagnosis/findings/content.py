@@ -375,8 +375,8 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
     """Cross-validated fractions explained by rate-free variables (drive, plays, averages of the drive over its travel),
     and by these together with averages over several times, which represent rates and creep.
 
-    Hysteresis that plays cannot follow causes an error that depends on both kinds of averages; only the second kind's
-    gain is due to rates.
+    Hysteresis that plays cannot follow causes an error that depends on both kinds of averages; only the gain from the
+    second kind is due to rates.
     """
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)

@@ -61,7 +61,7 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
 
 def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
-    """The two inverses over one record; None if an inverse fails or too few samples are compared."""
+    """Comparison of the two inverses over one record; None if an inverse fails or too few samples are compared."""
     end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]

@@ -665,8 +665,8 @@ def _step(
     """The best extension of a hypothesis and the extensions that were tried; None if there is no extension to try.
 
     `start`: the same hypothesis with other parameters, from which extensions are searched for; `least`: as in
-    `merit_of`. An extension may explain most only through its free start states and have no merit on equal terms; then
-    the next one is judged. If another explains far more, but at too few samples to be certain, none is named.
+    `merit_of`. If the best extension owes its small error only to free start states and has no merit on equal terms,
+    the next one is judged. If a skipped one explains far more, but at too few samples to be certain, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -751,7 +751,7 @@ def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) 
 
 
 def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
-    """Whether an effect removes enough from fitted records, although not from held-out ones."""
+    """Whether an effect removes enough from fitted records, whatever it removes from held-out ones."""
     _, fitted = _removed(now, tried, records)
     return fitted.removed >= _least(now) * max(records.noise, fitted.left)
 
@@ -794,7 +794,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights from a linear fit without, then with the effects: a sensor's curve misleads far from its range."""
+    """Weights from linear fits without, then with the effects: far from its range, a sensor's curve misleads a fit."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -826,7 +826,7 @@ def _exchanged(
 
     The first of two effects was chosen while the second was missing, and may have absorbed part of it; the second was
     then chosen next to a wrong first one. Rivals, too, are judged with all other effects present. `less`: the models
-    without one effect, as far as known; `names`: effects to search again, the best of some round.
+    without one effect, as far as known; `names`: effects to be searched again, each the best of some round.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -908,10 +908,10 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 
 
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """The effects with a rival for the latest and another shape of an earlier one, if that is better.
+    """The effects with the latest replaced by a rival and the shape of an earlier one by another, if that is better.
 
-    The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: each keeps
-    the other in place, so that exchanging only one does not find the pair that belongs together.
+    The earlier shape was chosen while the latest effect was missing, and the latest effect next to that shape. Each
+    keeps the other in place, so exchanging only one of them does not find the right pair.
     """
     others = {each.name: each for each in reversed(rivals(step.best, step.tried, records))}
     follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
