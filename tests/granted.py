@@ -111,7 +111,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # INVERSE  a Newton step from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
 # PLAY     a viscous play moves towards the play without viscosity, so it stays between the start memory and the ends
 #          of the input; a play that would come too near to another stops in between
-# INPUT    a bisection stays between the ends that it begins with
+# INPUT    a search stays between the ends that it begins with
 # DRAWN    a play drawn by its input, at once or by a dashpot, ends between its old position and that input, and so
 #          does an input that counts as standing still on its way
 # ASKED    the drive asked of a lag is at most a third of the size that its states have room for
@@ -180,7 +180,7 @@ STATES = [
     (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\([^;]*;\n)", r"\1        WITHIN(sum, PLAYS);\n"),
     (r"(    const uint16_t curve = NAME_bump_of\[i\];\n)", r"\1    /*@ split curve; */\n"),  # curve by curve
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
-    (r"(        next = search->low \+ [^;]*;\n)", r"\1        WITHIN(next, INPUT);\n"),
+    (r"(    search->before = search->input;\n)", r"    WITHIN(next, INPUT);\n\1"),
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # not facts: where Eva should stop widening, and what it should analyse case by case
