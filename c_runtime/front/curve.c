@@ -35,7 +35,8 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
     }
     const uint32_t on = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
     const int32_t h = (int32_t)(on & 0x7fffffffu);
-    coefficient = &coefficient[low * (degree + 1u)];
+    const unsigned int first = low * (degree + 1u);
+    coefficient = &coefficient[first];
     int32_t y = coefficient[degree];
     for (i = degree - 1u; i > 0; --i) {
         y = coefficient[i] + (int32_t)hystgen_part_of(y, h);

@@ -134,9 +134,11 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
     if (c->rose != on) {
         next = s[1].way - from;
         cap = c->rose == HYSTGEN_BOTTOM ? next : cap; /* all plays below its top follow */
+#ifndef HYSTGEN_HAS_NO_LIMIT
         if (limits) {
             cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
         }
+#endif
         m->from_input = -hystgen_along(m, from);
         m->from_output = c->output;
         m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;

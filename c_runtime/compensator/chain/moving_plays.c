@@ -63,8 +63,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= self->released; ++i) {
-        sum += hystgen_model_tables.weight[i] *
-               hystgen_bent(i, hystgen_resting(i, self->play, w));
+        sum += hystgen_model_tables.weight[i] * hystgen_bent(i, hystgen_resting(i, self->play, w));
     }
     return sum;
 }
@@ -166,7 +165,7 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 #else
 /* Contribution of play i where it is. */
 static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t *play,
-                                         const hystgen_sum_t *bent) {
+                                            const hystgen_sum_t *bent) {
 #ifdef HYSTGEN_HAS_BENT_PLAYS
     (void)play;
     return bent[i - 1u];
@@ -178,7 +177,7 @@ static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t
 
 /* A sum of plays, with those from play i on where they are. */
 HYSTGEN_APART hystgen_sum_t hystgen_with_staying(unsigned int i, const hystgen_play_t *play,
-                                              const hystgen_sum_t *bent, hystgen_sum_t sum) {
+                                                 const hystgen_sum_t *bent, hystgen_sum_t sum) {
     HYSTGEN_ROLLED
     for (; i <= HYSTGEN_N_PLAYS; ++i) {
         sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);

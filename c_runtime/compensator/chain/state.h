@@ -160,12 +160,12 @@ typedef struct {
     hystgen_real_t low; /* the solution lies between these */
     hystgen_real_t high;
     hystgen_real_t input;
-    hystgen_real_t asked; /* sum of the plays that the solution has */
-    hystgen_real_t sum;   /* their sum at the input tried, */
-    hystgen_real_t slope; /* its change per change of the input, */
-    hystgen_real_t steady; /* and that in steady motion, in which plays follow in full; */
+    hystgen_real_t asked;   /* sum of the plays that the solution has */
+    hystgen_real_t sum;     /* their sum at the input tried, */
+    hystgen_real_t slope;   /* its change per change of the input, */
+    hystgen_real_t steady;  /* and that in steady motion, in which plays follow in full; */
     hystgen_real_t reached; /* value that one of them reaches there, */
-    hystgen_real_t share; /* and its share of a further change of the input */
+    hystgen_real_t share;   /* and its share of a further change of the input */
 } hystgen_attempt_t;
 
 /* What a search for the input of the plays begins with. */

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8931843aef1a383784af95c386c010212f2d69a35eceb14b4f88be2db7b7e055, without this line
+ * Text: sha256 8d8145f158ed9c57e69ff196dfd58a283b54d60cc1f17f3664ebc0b664b2f442, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -338,7 +338,8 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
     }
     const uint32_t on = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
     const int32_t h = (int32_t)(on & 0x7fffffffu);
-    coefficient = &coefficient[low * (degree + 1u)];
+    const unsigned int first = low * (degree + 1u);
+    coefficient = &coefficient[first];
     int32_t y = coefficient[degree];
     for (i = degree - 1u; i > 0; --i) {
         y = coefficient[i] + (int32_t)curved_part_of(y, h);

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 c56004abeb431f17cc96f4db1f6cb7b722f2ad5abbd55874877e51ad6822b8b1, without this line
+ * Text: sha256 c3d6c955196ec035ff9a45cd39134ef6ca9cc762f52add1e010213b00b8bf9cc, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -587,9 +587,6 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
     if (c->rose != on) {
         next = s[1].way - from;
         cap = c->rose == TWO_BRANCHES_BOTTOM ? next : cap; /* all plays below its top follow */
-        if (limits) {
-            cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
-        }
         m->from_input = -two_branches_along(m, from);
         m->from_output = c->output;
         m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
