@@ -167,7 +167,9 @@ static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slo
    Returns whether that input is the solution: the sum is so near that one more step leaves next to
    nothing. It goes by the slope there if plays start to move softly, else by the middle of all
    slopes. */
-#if defined(HYSTGEN_HAS_BENT_PLAYS) || defined(HYSTGEN_HAS_DASHPOT_PLAYS)
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+HYSTGEN_APART
+#elif defined(HYSTGEN_HAS_DASHPOT_PLAYS)
 HYSTGEN_APART
 #else
 static inline
