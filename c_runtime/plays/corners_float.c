@@ -121,7 +121,7 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
 #ifndef HYSTGEN_HAS_NO_LIMIT
     if (stop || y > output) {
 #else
-    if (stop) {
+    if (limits) {
 #endif
         const hystgen_real_t x = begin + (output - start) * s->slope;
         m->here.input = hystgen_along(m, x < input ? x : input);

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 c3d6c955196ec035ff9a45cd39134ef6ca9cc762f52add1e010213b00b8bf9cc, without this line
+ * Text: sha256 949dce3c44e4c8a78666ecdbb44489764e2974a22ba42b0c88ac25f06a285ea6, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -575,7 +575,7 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
     m->gain = s->gain;
     m->here.k = (uint_least16_t)k;
     const two_branches_real_t y = stop ? output : start + (input - begin) * s->gain;
-    if (stop) {
+    if (limits) {
         const two_branches_real_t x = begin + (output - start) * s->slope;
         m->here.input = two_branches_along(m, x < input ? x : input);
         m->here.output = two_branches_along(m, output);
