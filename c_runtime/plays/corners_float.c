@@ -41,8 +41,8 @@ HYSTGEN_API void hystgen_take_back(hystgen_plays_t *m, const hystgen_place_t *to
     hystgen_forget_line(m);
 }
 
-/* Reverses the move and, if plays have followed, leaves a corner. A block whose last play follows
-   only beyond the limit is never passed. */
+/* Reverses the move; leaves a corner if plays have followed, never passed if its block ends beyond
+   the limit. */
 HYSTGEN_SWIFT void hystgen_reverse(const hystgen_curve_t *t, hystgen_plays_t *m,
                                    hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
@@ -160,7 +160,11 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
 HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
                                            hystgen_corner_t *corner, hystgen_real_t output) {
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
+#ifdef HYSTGEN_HAS_NO_LIMIT
+        hystgen_reverse(t, m, corner); /* deep in a chain stack matters more than bytes */
+#else
         hystgen_reverse_apart(t, m, corner);
+#endif
     }
     const hystgen_direction_t on = hystgen_direction(m->here.rising);
     unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */

@@ -41,7 +41,7 @@ SECANTS = 10
 benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8, some take 25."""
 
 FASTEST = 2**31 - 1
-"""Largest rate: its product with a word fits in 63 bits."""
+"""[steps of the input per 2^rate_bits of the sum] Largest rate: the largest whose product with a word fits 63 bits."""
 
 
 class MovingTables(NamedTuple):

@@ -41,9 +41,8 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 #endif
 
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
-/* Plays that are bent but move with their input alone leave their places in the order of their
-   thresholds. The contributions of those that stay are kept as a sum (`staying`). Takes those that
-   leave for w out of it. */
+/* Bent plays leave their places in the order of their thresholds; the contributions of those that
+   stay are kept as a sum (`staying`). Takes the plays that leave for w out of it. */
 HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_play_t w) {
     unsigned int i;
     HYSTGEN_ROLLED
@@ -68,8 +67,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     return sum;
 }
 
-/* The plays move while their input moves to w, where their sum is `sum`. All of them stay once the
-   last one that has moved does. */
+/* The plays move with their input to w; their sum is now `sum`. All stay if the last mover does. */
 HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_t w,
                                          hystgen_sum_t sum) {
     hystgen_play_t before = 0;

@@ -161,12 +161,10 @@ static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slo
     return left * rate;
 }
 
-/* Goes on from try k to the next input: by the slope there, as long as that leads to an input
-   inside the interval and k is not too large; else to the middle of the interval. Both ends of the
-   interval are known to be beyond the solution, so that a wrong slope costs tries and nothing else.
-   Returns whether that input is the solution: the sum is so near that one more step leaves next to
-   nothing. It goes by the slope there if plays start to move softly, else by the middle of all
-   slopes. */
+/* Goes on from try k to the next input: by the slope there, if that leads to an input inside the
+   interval and k is not too large; else to its middle. A wrong slope costs only tries. Returns
+   whether that input is the solution, by a last step along the slope there if plays start to move
+   softly, else along the middle of all slopes. */
 #ifdef HYSTGEN_HAS_BENT_PLAYS
 HYSTGEN_APART
 #elif defined(HYSTGEN_HAS_DASHPOT_PLAYS)

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ef75754a51f769da87f7c2285cea1a15ea67bf5292e08ca78cf6bcb67da655fe, without this line
+ * Text: sha256 22a954869588fae9f19be6880ca7bd3ca77946b8ebdf7976a27ffbce3d2e32c7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -112,8 +112,8 @@ static void plain_take_back(plain_plays_t *m, const plain_place_t *to) {
     plain_forget_line(m);
 }
 
-/* Reverses the move and, if plays have followed, leaves a corner. A block whose last play follows
-   only beyond the limit is never passed. */
+/* Reverses the move; leaves a corner if plays have followed, never passed if its block ends beyond
+   the limit. */
 PLAIN_SWIFT void plain_reverse(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
     const plain_direction_t on = plain_direction(m->here.rising);

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 949dce3c44e4c8a78666ecdbb44489764e2974a22ba42b0c88ac25f06a285ea6, without this line
+ * Text: sha256 f5e172c34ae5e9f355ba0ef7b61f3c926138631aafedc5d82e22cc27c69c699c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -505,8 +505,8 @@ static void two_branches_take_back(two_branches_plays_t *m, const two_branches_p
     two_branches_forget_line(m);
 }
 
-/* Reverses the move and, if plays have followed, leaves a corner. A block whose last play follows
-   only beyond the limit is never passed. */
+/* Reverses the move; leaves a corner if plays have followed, never passed if its block ends beyond
+   the limit. */
 TWO_BRANCHES_SWIFT void two_branches_reverse(const two_branches_curve_t *t, two_branches_plays_t *m,
         two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
@@ -605,7 +605,7 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t output) {
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
-        two_branches_reverse_apart(t, m, corner);
+        two_branches_reverse(t, m, corner); /* deep in a chain stack matters more than bytes */
     }
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
     unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
