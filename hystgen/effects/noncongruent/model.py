@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
@@ -63,12 +64,9 @@ class _Noncongruent(Effect):
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """Add `weight` times the change that bending makes to play `i` > 0 to `total` (N,)."""
 
+    @abstractmethod
     def bent(self, rows: Array, thresholds: Array) -> Array:
         """The drive itself, and the bent plays."""
-        out = np.array(rows)
-        for i in range(1, len(rows)):
-            self.bend(i, rows[i], thresholds, 1.0, out[i])
-        return out
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
         """The sum of the bent plays; plays of weight 0 need not be bent."""
@@ -103,6 +101,16 @@ class PlayFunctions(_Noncongruent):
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """The amount that its polynomial adds to a play."""
         curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """The drive itself, and the bent plays: all at once, since a compensator bends them sample by sample."""
+        out = np.array(rows)
+        xi = out[1:] / thresholds[-1]
+        value = np.zeros_like(xi)
+        for c in reversed(list(itertools.zip_longest(*self.coefficients[: len(xi)], fillvalue=0.0))):
+            value = np.array(c)[:, None] + value * xi
+        out[1:] += thresholds[-1] * xi * xi * value
+        return out
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -155,6 +163,12 @@ class LoopCentre(_Noncongruent):
         """The amount that the density's integral adds to a play."""
         bump = np.tanh((row - self.centre) / self.width) + np.tanh(self.centre / self.width)
         total += weight * self.amplitude * self.width * bump
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """The drive itself, and the bent plays, which all have the same curve."""
+        out = np.array(rows)
+        self.bend(1, rows[1:], thresholds, 1.0, out[1:])
+        return out
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
