@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -38,12 +38,12 @@ class Function:
     @property
     def names(self) -> tuple[str, ...]:
         """The names of its parameters."""
-        return tuple(re.findall(r"\w+", each)[-1] for each in self.parameters)
+        return tuple(re.findall(r"\w+", each)[-1] for each in self.parameters if each != "void")
 
     @property
     def types(self) -> tuple[str, ...]:
         """The types of its parameters."""
-        return tuple(each[: each.rindex(name)].strip() for each, name in zip(self.parameters, self.names, strict=True))
+        return tuple(each[: each.rindex(name)].strip() for each, name in zip(self.parameters, self.names, strict=False))
 
     @property
     def answer(self) -> str:
@@ -95,32 +95,35 @@ def folded(
         comments.append(found[0])
         return f"/*{len(comments) - 1}*/"
 
-    masked = [replace(each, body=_COMMENT.sub(mask, each.body)) for each in functions]
-    folding = _Folding(masked, list(kernels), apart, meaning)
+    masked = [
+        replace(each, above=_COMMENT.sub(mask, each.above), body=_COMMENT.sub(mask, each.body)) for each in functions
+    ]
+    folding = _Folding(masked, list(kernels), comments, apart, meaning)
     while folding.once():
         kept = wanted(folding.functions)
         folding.functions = {name: each for name, each in folding.functions.items() if name in kept}
 
-    def unmask(found: re.Match[str]) -> str:
-        return comments[int(found[1])]
+    def unmask(text: str) -> str:
+        return re.sub(r"/\*(\d+)\*/", lambda found: comments[int(found[1])], text)
 
     return {
-        name: replace(each, body=re.sub(r"/\*(\d+)\*/", unmask, each.body)) for name, each in folding.functions.items()
+        name: replace(each, above=unmask(each.above), body=unmask(each.body))
+        for name, each in folding.functions.items()
     }
 
 
 class _Folding:
-    """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
-    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several can
-    denote the same type here."""
+    """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged;
+    `comments`: texts of the comments, for which numbers stand; `apart`: first words of functions that are not inlined
+    here, to save stack; `meaning`: of a type name, since several can denote the same type here."""
 
     def __init__(
-        self, functions: Sequence[Function], kernels: Sequence[Function], apart: Sequence[str],
-        meaning: Callable[[str], str],
+        self, functions: Sequence[Function], kernels: Sequence[Function], comments: Sequence[str],
+        apart: Sequence[str], meaning: Callable[[str], str],
     ) -> None:
         self.functions = {each.name: each for each in functions}
         self._known = {each.name: each for each in kernels}
-        self._apart, self._meaning = tuple(apart), meaning
+        self._comments, self._apart, self._meaning = comments, tuple(apart), meaning
 
     def once(self) -> bool:
         """Do one round. Returns whether anything changed."""
@@ -131,18 +134,27 @@ class _Folding:
         self._decided()
         for operator in ("forward", "inverse"):
             self._unread_fields(operator)
+        if self.functions == before:
+            self._splice()
         return self.functions != before
+
+    def _splice(self) -> None:
+        """Put the statements of functions with one call in its place, once nothing else is left to do."""
+        for name, function in list(self.functions.items()):
+            if function.own and not function.before.startswith(self._apart) and len(list(self._given(name))) == 1:
+                self._calls(name, functools.partial(self._spliced, self.functions[name]))
 
     def _change(self, name: str, body: str) -> None:
         self.functions[name] = replace(self.functions[name], body=body)
 
-    def _calls(self, name: str, changed: Callable[[str, int, int, list[str]], str | None]) -> None:
-        """Change every call of a function; `changed` takes the body, the call's start and end, and its arguments."""
+    def _calls(self, name: str, changed: Callable[[Function, int, int, list[str]], str | None]) -> None:
+        """Change every call of a function; `changed` takes the caller, the call's start and end in its body, and the
+        arguments, and returns the new body."""
         for caller, function in self.functions.items():
             body, at = function.body, 0
             while found := re.compile(rf"\b{name}\(").search(body, at):
                 end, arguments = _arguments(body, found.end())
-                new = changed(body, found.start(), end, arguments)
+                new = changed(replace(function, body=body), found.start(), end, arguments)
                 at = found.end()
                 if new is not None:
                     body, at = new, found.start()
@@ -171,11 +183,12 @@ class _Folding:
             self.functions[name] = replace(function, parameters=parameters, body=_unmarked(function.body, gone))
 
             def without(
-                body: str, start: int, end: int, arguments: list[str], name: str = name, kept: Sequence[bool] = kept
+                caller: Function, start: int, end: int, arguments: list[str], name: str = name,
+                kept: Sequence[bool] = kept,
             ) -> str | None:
                 if len(arguments) != len(kept):  # already changed
                     return None
-                return f"{body[:start]}{name}({', '.join(_where(arguments, kept))}){body[end:]}"
+                return f"{caller.body[:start]}{name}({', '.join(_where(arguments, kept))}){caller.body[end:]}"
 
             self._calls(name, without)
 
@@ -189,55 +202,132 @@ class _Folding:
         """Replace the calls of a function with its body, if that is empty or a single simple statement."""
         does = function.statements
         if function.own and does == "":
-            self._calls(function.name, _no_statement)
+            self._calls(function.name, functools.partial(self._spliced, function))
             return
-        if not function.own or function.before.startswith(self._apart):
+        if not function.own:
             return
-        if (found := re.fullmatch(r"return (\w+);", does)) and found[1] in function.names:
-            place = function.names.index(found[1])
-            same = self._same(function.types[place], function.answer)
-            self._calls(function.name, functools.partial(_argument, place=place, same=same))
-        elif (found := re.fullmatch(r"return \((\w+)\)(\w+);", does)) and found[2] in function.names:
-            self._converted(function.name, found[1])
-        elif re.fullmatch(r"return self->\w+;", does) or does in ("return true;", "return false;"):
-            self._calls(function.name, lambda body, start, end, _: body[:start] + does[7:-1] + body[end:])
-        elif found := re.fullmatch(r"(return )?(hystgen_\w+)\((.*)\);", does):
-            self._forward(function, found[2], f"{found[3]})", bool(found[1]))
+        apart, answered = function.before.startswith(self._apart), does.removeprefix("return ").removesuffix(";")
+        places = sum(1 for _ in self._given(function.name))
+        if apart and not (places == 1 and self._brief(answered)):
+            return
+        if ";" not in answered and does != answered and (places == 1 or _forwards(answered)):
+            self._calls(function.name, functools.partial(self._put, function, answered))
 
-    def _converted(self, name: str, kind: str) -> None:
-        """Remove calls that convert an argument to the type that it already has."""
-        for caller, function in self.functions.items():
-            same = {each for each, own in _declared(function).items() if self._same(own, kind)}
-            for each in same:
-                function = replace(function, body=function.body.replace(f"{name}({each})", each))
-            self.functions[caller] = function
+    def _brief(self, expression: str) -> bool:
+        """Whether an expression calls nothing but functions that a compiler inlines."""
+        called = [self.functions.get(each) for each in re.findall(r"(\w+)\(", expression)]
+        return ";" not in expression and all(each and each.before.startswith("static inline") for each in called)
 
-    def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
-        """Let callers directly call the function to which this one only forwards."""
-        other = self.functions.get(name) or self._known.get(name)
-        end, given = _arguments(rest, 0)
-        if other is None or end != len(rest) or len(given) != len(other.names):
-            return
-        if answers and not self._same(function.answer, other.answer):
-            return
-        types = dict(zip(function.names, function.types, strict=True))
-        for argument, kind in zip(given, other.types, strict=True):
-            inside = [each for each in re.findall(r"(?<![.>\w])\w+", argument) if each in types]
-            if any(argument != each and each != "self" for each in inside):
-                return
-            if argument in types and not self._same(types[argument], kind):
-                return
-        if any(sum(argument == each for argument in given) > 1 for each in types if each != "self"):
-            return
-
-        def called(body: str, start: int, stop: int, arguments: list[str]) -> str | None:
-            put = dict(zip(function.names, arguments, strict=True))
-            if put.get("self", "self") != "self":
+    def _put(
+        self, function: Function, expression: str, caller: Function, start: int, stop: int, arguments: list[str]
+    ) -> str | None:
+        """The caller's body with a function's only expression in place of a call, if no conversion is lost and nothing
+        is computed twice or in another order."""
+        body = caller.body
+        ordered = _forwards(expression) or all(re.fullmatch(r"&[\w>.-]+|\w+", each) for each in arguments)
+        if not ordered and not (self._looks(expression) and all(map(self._looks, arguments))):
+            return None
+        if not self._answers(function, expression) and not self._converts(function, caller, start, stop):
+            return None
+        for name, kind, argument in zip(function.names, function.types, arguments, strict=True):
+            uses = list(re.finditer(rf"(?<![.>\w]){name}\b", expression))
+            if not _PLAIN.fullmatch(argument) and len(uses) > 1:
                 return None
-            new = [put.get(each, each) for each in given]
-            return f"{body[:start]}{name}({', '.join(new)}){body[stop:]}"
+            if "*" not in kind and expression != name and not self._same(self._kind(caller, argument), kind):
+                types = [self._taken(expression, each.start(), each.end()) for each in uses]
+                if not all(each and self._same(each, kind) for each in types):
+                    return None
+        given = dict(zip(function.names, arguments, strict=True))
+        if any(argument.startswith("&") and f"{name}[" in expression for name, argument in given.items()):
+            return None
+        put = _substituted(expression, given)
+        if (found := re.fullmatch(r"\((\w+)\)(\w+)", put)) and self._same(self._kind(caller, found[2]), found[1]):
+            put = found[2]
+        if body[:start].endswith("(!") and body[stop] == ")" and put.count(" == ") == 1 and _LOOSER.search(put) is None:
+            start, put = start - 1, put.replace(" == ", " != ")
+        whole = _single(put) or _delimited(body, start, stop)
+        return body[:start] + (put if whole else f"({put})") + body[stop:]
 
-        self._calls(function.name, called)
+    def _answers(self, function: Function, expression: str) -> bool:
+        """Whether an expression surely has the type that a function returns."""
+        if function.answer == "bool" and re.search(r" (?:[=!<>]=|[<>]) ", expression):
+            return True
+        if _PLAIN.fullmatch(expression):
+            own = dict(zip(function.names, function.types, strict=True)).get(expression, function.answer)
+            return self._same(own, function.answer)
+        if found := re.match(r"\((\w+)\)(?=[\w(])", expression):
+            return _single(expression[found.end() :]) and self._same(found[1], function.answer)
+        if found := re.match(r"(\w+)\(", expression):
+            other = self.functions.get(found[1]) or self._known.get(found[1])
+            return other is not None and _single(expression) and self._same(other.answer, function.answer)
+        return False
+
+    def _converts(self, function: Function, caller: Function, start: int, stop: int) -> bool:
+        """Whether a call's result is the caller's answer, an argument or the first value of a constant, of its type."""
+        before = caller.body[caller.body.rfind(";", 0, start) + 1 : start]
+        found = re.search(r"(?:const (\w+) \w+ =|\breturn)\s+(?:[^;{}?]*\?[^;{}:]*(?::\s)?\s*)?$", before)
+        if found and re.match(r"\s*[;:]", caller.body[stop:]):
+            return self._same(found[1] or caller.answer, function.answer)
+        return self._same(self._taken(caller.body, start, stop), function.answer)
+
+    def _kind(self, caller: Function, argument: str) -> str:
+        """The type of an argument as far as it is known, or empty."""
+        if found := re.match(r"(\w+)\(", argument):
+            other = self.functions.get(found[1]) or self._known.get(found[1])
+            return other.answer if other and _single(argument) else ""
+        kinds = _declared(caller)
+        of = {kinds.get(each, "") for each in re.findall(r"[A-Za-z]\w*", argument)}
+        sums = re.fullmatch(r"[\w +*-]+", argument) is not None and not any(self._same(each, "int16_t") for each in of)
+        return of.pop() if len(of) == 1 and (sums or argument in of) else kinds.get(argument, "")
+
+    def _taken(self, text: str, start: int, end: int) -> str:
+        """The type of the parameter whose whole argument a part of a text is, or empty."""
+        place = depth = 0
+        for at in range(start - 1, -1, -1):
+            depth += {")": 1, "(": -1}.get(text[at], 0)
+            place += text[at] == "," and depth == 0
+            if depth < 0:
+                name = re.search(r"\w*$", text[:at])
+                other = name and (self.functions.get(name[0]) or self._known.get(name[0]))
+                known = other and place < len(other.types) and _delimited(text, start, end)
+                return other.types[place] if other and known else ""
+        return ""
+
+    def _spliced(
+        self, function: Function, caller: Function, start: int, stop: int, arguments: list[str]
+    ) -> str | None:
+        """The caller's body with the statements of a function in place of its only call, if that is a statement."""
+        body = caller.body
+        begin, end = body.rfind("\n", 0, start) + 1, body.find("\n", stop) + 1
+        found = re.fullmatch(r"( *)(return |\(void\))?", body[begin:start])
+        if not found or body[stop:end].strip() != ";":
+            return None
+        answers = found[2] == "return " and self._same(function.answer, caller.answer)
+        if not answers and (found[2] == "return " or re.search(r"\breturn\b", function.body)):
+            return None
+        words = set(re.findall(r"\w+", body)) | set(caller.names)
+        inside, declared = _unmarked(function.body, function.names), ""
+        if words & {each[1] for each in _LOCAL.finditer(inside)}:
+            return None
+        given: dict[str, str] = {}
+        for name, kind, argument in zip(function.names, function.types, arguments, strict=True):
+            set_here = re.search(rf"(?<![.>\w*]){name} [-+*|&^]?= ", inside)
+            same = re.fullmatch(r"\w+", argument) and self._same(_declared(caller).get(argument, ""), kind)
+            if not re.search(rf"\b{name}\b", inside) and self._looks(argument):
+                continue
+            entry = argument.startswith("&") and f"{name}[" in inside
+            if not set_here and ((same or ("*" in kind and _PLAIN.fullmatch(argument))) and not entry):
+                given[name] = argument
+            elif name in words or declared:
+                return None
+            else:
+                declared = f"    {'' if set_here or '*' in kind else 'const '}{kind} {name} = {argument};\n"
+        inside = _substituted(inside, given)
+        deeper = found[1][4:]
+        said = re.findall(r"\w+", self._comments[int(found[0])]) if (found := re.search(r"\d+", function.above)) else []
+        kept = all(name == argument or name not in said for name, argument in given.items())
+        whole = (f"    {function.above}" if inside and said and kept else "") + declared + inside
+        return body[:begin] + re.sub(r"^(?=.)", deeper, whole, flags=re.MULTILINE) + body[end:]
 
     def _same(self, one: str, other: str) -> bool:
         """Whether two names denote the same type."""
@@ -273,9 +363,9 @@ class _Folding:
     def _copies(self, function: Function, body: str) -> str:
         """The body without constants that only repeat another constant or a parameter."""
         types = _declared(replace(function, body=body))
-        for found in re.finditer(r"^ *const (\w+) (\w+) = (\w+);\n", body, re.MULTILINE):
+        for found in re.finditer(r"^ *const (\w+) (\w+) =\s+(\w+);\n", body, re.MULTILINE):
             kind, copy, of = found.groups()
-            declared = re.sub(rf"^ *const \w+ {of} = ", "", body, flags=re.MULTILINE)
+            declared = re.sub(rf"^ *const \w+ {of} =\s", "", body, flags=re.MULTILINE)
             if of not in types or re.search(rf"(?<![.>\w]){of} [-+*|&^]?= |&{of}\b", declared):
                 continue
             rest = body.replace(found[0], "", 1)
@@ -353,26 +443,44 @@ def _delimited(body: str, start: int, end: int) -> bool:
     return bool(before.search(body[:start])) and bool(behind.match(body[end:]))
 
 
-def _no_statement(body: str, start: int, end: int, _: list[str]) -> str | None:
-    """The body without a call that is a statement of its own."""
-    begin = body.rfind("\n", 0, start) + 1
-    stop = body.find("\n", end) + 1
-    if body[begin:start].strip() not in ("", "(void)") or body[end:stop].strip() != ";":
-        return None
-    return body[:begin] + body[stop:]
+def _single(expression: str) -> bool:
+    """Whether an expression is a name, a member, an entry or a call, which needs no parentheses anywhere."""
+    if re.fullmatch(r"[\w.>\[\]-]+", expression):
+        return True
+    called = re.match(r"\w+\(", expression)
+    return called is not None and _arguments(expression, called.end())[0] == len(expression)
 
 
-def _argument(
-    body: str, start: int, end: int, arguments: list[str], place: int, same: bool
-) -> str | None:
-    """The body with the call replaced by one of its arguments."""
-    argument, whole = arguments[place], _delimited(body, start, end)
-    if not whole and not same:
-        return None
-    single = re.fullmatch(r"[\w.>\[\]-]+", argument) or _arguments(f"{argument})", argument.find("(") + 1)[0] == len(
-        argument
-    )
-    return body[:start] + (argument if whole or single else f"({argument})") + body[end:]
+def _substituted(text: str, given: Mapping[str, str]) -> str:
+    """A text with arguments in place of parameters."""
+
+    def instead(found: re.Match[str]) -> str:
+        content, name, member = found.groups()
+        if (argument := given.get(name)) is None:
+            return found[0]
+        if argument.startswith("&") and (content or member):
+            return argument[1:] + ("." if member else "")
+        whole = _single(argument) or found[0] == text or _delimited(text, found.start(), found.end())
+        return (content or "") + (argument if whole else f"({argument})") + (member or "")
+
+    return re.sub(r"(\*)?(?<![.>\w])([A-Za-z]\w*)\b(->)?", instead, text)
+
+
+def _forwards(expression: str) -> bool:
+    """Whether an expression is plain, or a call of another function with plain arguments; both may be converted."""
+    found = re.match(r"(?:\(\w+\))?\w+\(", expression)
+    if not found:
+        return _PLAIN.fullmatch(re.sub(r"^\(\w+\)", "", expression)) is not None
+    end, arguments = _arguments(expression, found.end())
+    return end == len(expression) and all(_PLAIN.fullmatch(each) for each in arguments)
+
+
+_PLAIN = re.compile(r"&?\w+(?:(?:->|\.)\w+)*")
+"""An expression that can be written twice: a name, a number, a member, or its address."""
+_LOOSER = re.compile(r" (?:&&|\|\||\?|[|^&]) ")
+"""Operators that bind less tightly than a comparison."""
+_LOCAL = re.compile(r"^ *(?:(?:const|static|volatile|unsigned) )*\w+ \**(\w+)(?:\[[^\]]*\])?(?: =\s|;)", re.MULTILINE)
+"""The declaration of a local variable."""
 
 
 _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)

@@ -126,21 +126,22 @@ def composed(one: EmittedModel) -> Code:
     kernels = runtime.needed([*runtime.table_pieces(family), *kernels], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
+    numbers = one.numbers
+    named = _named(text, [*numbers.plays, *numbers.beside])
+    plays, beside = ([each for each in every if each.name in named] for every in (numbers.plays, numbers.beside))
+    contents = [each for table in (*plays, *beside) for each in table.contents]
     tables: list[runtime.Piece] = []
     if one.glue:
         glue = one.glue.named({op: runtime.fields(pieces, op) for op in operators})
         types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
-        tables = [piece for piece in runtime.needed(types, called) if piece not in states]
+        kinds = [f"hystgen_{kind}" for kind, _ in contents]
+        tables = [piece for piece in runtime.needed(types, [*called, *kinds]) if piece not in states]
     else:
         states = runtime.state_pieces(one.variant, family, operators, pieces)
     shown = runtime.render_operators(states, names.name, one.corners, names.rt, family)
     if one.corners and not shared:
         shown = f"{runtime.all_types(family.states, names.rt, family)}\n{shown}"
-    numbers = one.numbers
-    named = _named(text, [*numbers.plays, *numbers.beside])
-    plays, beside = ([each for each in every if each.name in named] for every in (numbers.plays, numbers.beside))
-    contents = (each for table in (*plays, *beside) for each in table.contents)
     return Code(
         types=runtime.render_operators(tables, names.name, 0, names.rt, family),
         states=shown,

@@ -150,13 +150,10 @@ class Family(ABC):
         """Number of corners that the corner engine keeps for this many plays."""
         return max(plays, 1)
 
-    def alike(self, kind: str) -> str:
-        """The name of a type, or of the type that it is equal to here."""
-        return kind
-
     def meaning(self, kind: str) -> str:
-        """The type that a name denotes here, both without prefix."""
-        return self.alike(self.signals.get(f"hystgen_{kind}", kind).removeprefix("hystgen_"))
+        """The type that a name denotes here, without prefix."""
+        own = self.signals.get(f"hystgen_{kind}", kind).removeprefix("hystgen_")
+        return self.types.get(own, self.real if own in (*SUMS, "real_t") else own)
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -207,9 +204,6 @@ class FloatFamily(Family):
 
     def corners(self, plays: int) -> int:
         return plays + 1
-
-    def alike(self, kind: str) -> str:
-        return "real_t" if kind in SUMS else kind
 
     def storage(self, corners: bool) -> dict[str, str]:
         return {
@@ -729,8 +723,8 @@ def _named(
             text = text.replace(f"({shared})", "")
     text = _NAME.sub(lambda found: signals.get(found[0], found[0]), text)
     for kind in SUMS:
-        if (here := family.alike(kind)) != kind:
-            text = text.replace(f"(hystgen_{kind})", "").replace(f"hystgen_{kind}", f"hystgen_{here}")
+        if kind not in family.types:
+            text = text.replace(f"(hystgen_{kind})", "").replace(f"hystgen_{kind}", "hystgen_real_t")
     for constant, value in family.arithmetic.constants.items():
         text = text.replace(constant, value)
     own = _own(family) - carried

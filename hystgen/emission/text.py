@@ -271,10 +271,12 @@ def _comment(lines: list[str]) -> Iterator[str]:
         mark = re.match(r"/\* | \* {1,}|\s+|", body)
         assert mark
         hang = more if body.startswith("/*") else indent + mark[0]
-        yield from textwrap.wrap(
-            body[mark.end() :], WIDTH, initial_indent=indent + mark[0], subsequent_indent=hang,
-            break_long_words=False, break_on_hyphens=False,
-        )
+        words = body[mark.end() :].replace(" */", "\0*/")  # the end of a comment stays behind its last word
+        for part in textwrap.wrap(
+            words, WIDTH, initial_indent=indent + mark[0], subsequent_indent=hang, break_long_words=False,
+            break_on_hyphens=False,
+        ):
+            yield part.replace("\0", " ")
 
 
 def _directive(line: str) -> Iterator[str]:

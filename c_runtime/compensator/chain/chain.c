@@ -81,13 +81,13 @@ static void hystgen_inverse_take(hystgen_inverse_t *self) {
     }
 }
 
-/* Returns drive v and leaves it pending. */
-static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v) {
-    self->answer = v;
-    self->pending = v;
+/* Returns a drive and leaves it pending. */
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t sent) {
+    self->answer = sent;
+    self->pending = sent;
     self->has_pending = true;
     self->stepped = true;
-    return v;
+    return sent;
 }
 #endif
 

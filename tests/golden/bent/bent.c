@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 38e4b3b68802b9fb82fefeb5564643abd775f8e4553f271323c0a470e8688c9f, without this line
+ * Text: sha256 a06ef7a6a81d3a8c726f856b3a0e705d208e20d1c013b90bd338f06ce3a037b4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -211,11 +211,6 @@ static bent_real_t bent_forward_displaced(bent_real_t y) {
     return y + BENT_OFFSET;
 }
 
-/* The output of the chain for the displacement u, or the nearest possible one. */
-static bent_real_t bent_inverse_undisplaced(bent_real_t u) {
-    return u - BENT_OFFSET;
-}
-
 static bent_real_t bent_clamp_drive(bent_real_t v) {
     const bent_real_t least = v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v;
     return (bent_real_t)(least > BENT_DRIVE_MAX ? BENT_DRIVE_MAX : least);
@@ -226,20 +221,11 @@ static bent_real_t bent_inverse_clamp(bent_real_t u) {
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
-/* The actuator has moved to drive v. */
-static void bent_inverse_set_drive(bent_inverse_t *self, bent_real_t v) {
-    self->drive = v;
-}
-
 /* The actuator has moved to drive v. Returns the input of the plays. */
 static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
-    bent_inverse_set_drive(self, v);
+    /* The actuator has moved to drive v. */
+    self->drive = v;
     return bent_front_forward(v);
-}
-
-/* Last returned drive again. */
-static bent_real_t bent_inverse_held(const bent_inverse_t *self) {
-    return self->stepped ? self->answer : self->drive;
 }
 
 /* Whether the last returned drive is still valid for u, which becomes the last reference. */
@@ -257,56 +243,19 @@ static bool bent_finite(bent_real_t x) {
     return x >= -DBL_MAX && x <= DBL_MAX; /* false for NaN */
 }
 
-static inline bool bent_is_drive(bent_real_t v) {
-    return v >= BENT_DRIVE_MIN && v <= BENT_DRIVE_MAX; /* false for NaN */
-}
-
-static inline bool bent_is_reference(bent_real_t u) {
-    return u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX;
-}
-
-/* An applied drive, limited to its range; never -0. */
-static inline bent_real_t bent_applied_drive(bent_real_t v) {
-    return bent_clamp_drive(v) + 0;
-}
-
-/* Input of the plays at which their sum is h. The plays are summed again if their present sum is
-   not stored (without effects) or lacks bits (in fixed point, where the kernel sums them). */
-static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
-    return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
-}
-
-/* Passes drive v through the drive side and moves the plays. */
-static inline void bent_forward_played(bent_forward_t *self, bent_real_t v) {
-    bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
-}
-
 /* The part common to init and reset, after the plays are set: everything rests at this drive. */
 static void bent_forward_begin(bent_forward_t *self) {
     self->status = 0;
     self->answer = bent_forward_displaced(bent_loop_output(&bent_model_tables, self->play));
 }
 
-/* Passes drive v through the drive side and moves the plays. */
-static inline void bent_inverse_played(bent_inverse_t *self, bent_real_t v) {
-    bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
-}
-
-/* The actuator has seen the pending drive. */
-static void bent_inverse_take(bent_inverse_t *self) {
-    if (self->has_pending) {
-        bent_inverse_played(self, self->pending);
-        self->has_pending = false;
-    }
-}
-
-/* Returns drive v and leaves it pending. */
-static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
-    self->answer = v;
-    self->pending = v;
+/* Returns a drive and leaves it pending. */
+static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t sent) {
+    self->answer = sent;
+    self->pending = sent;
     self->has_pending = true;
     self->stepped = true;
-    return v;
+    return sent;
 }
 
 /* The part common to init and reset, after the plays are set: everything rests at this drive. */
@@ -346,7 +295,7 @@ void bent_inverse_reset(bent_inverse_t *self, bent_real_t u) {
 
 bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     bent_real_t inside = v;
-    if (!bent_is_drive(v)) {
+    if (!(v >= BENT_DRIVE_MIN && v <= BENT_DRIVE_MAX)) {
         if (!bent_finite(v)) {
             self->status |= BENT_STATUS_HELD;
             return self->answer;
@@ -354,16 +303,17 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
         inside = bent_clamp_drive(v);
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }
-    bent_forward_played(self, inside);
+    bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(inside));
     const bent_real_t answer = bent_forward_displaced(bent_loop_output(&bent_model_tables,
         self->play));
     self->answer = answer;
     return answer;
 }
 
-/* A reference that is not finite: repeats the newest one. */
-static void bent_inverse_unread(bent_inverse_t *self) {
-    self->status |= BENT_STATUS_HELD;
+/* Takes the next reference, which lies within its range. Returns the target of the output side at
+   this sample. */
+static inline bent_real_t bent_inverse_put(bent_real_t level) {
+    return level - BENT_OFFSET;
 }
 
 /* The drive v within its limits. */
@@ -376,14 +326,21 @@ static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
-static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
+bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
+    /* The actuator has seen the pending drive. */
+    if (self->has_pending) {
+        bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, self->pending));
+        self->has_pending = false;
+    }
+    /* The next drive, for reference u; the memory is up to date. `bits`: status of the
+       reference. */
     bent_real_t level = u;
     unsigned int bits = 0;
-    if (!bent_is_reference(u)) {
+    if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
         if (!bent_finite(u)) {
-            bent_inverse_unread(self);
-            return bent_inverse_answer(self, bent_inverse_held(self));
+            /* A reference that is not finite: repeats the newest one. */
+            self->status |= BENT_STATUS_HELD;
+            return bent_inverse_answer(self, self->stepped ? self->answer : self->drive);
         }
         level = bent_inverse_clamp(u);
         bits = BENT_STATUS_INPUT_CLAMPED;
@@ -392,15 +349,11 @@ static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u)
         return bent_inverse_answer(self, self->answer);
     }
     self->bits = bits;
-    const bent_real_t h = bent_inverse_undisplaced(level);
-    const bent_real_t w = bent_input_of(self->play, h);
+    const bent_real_t h = bent_inverse_put(level);
+    const bent_real_t w = bent_loop_solve(&bent_model_tables, self->play,
+        bent_loop_output(&bent_model_tables, self->play), h);
     const bent_real_t v = bent_front_inverse(w);
     return bent_inverse_answer(self, bent_inverse_limited(self, v));
-}
-
-bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
-    bent_inverse_take(self);
-    return bent_inverse_next(self, u);
 }
 
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
@@ -408,7 +361,7 @@ void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
         self->status |= BENT_STATUS_HELD;
         return;
     }
-    const bent_real_t inside = bent_applied_drive(applied);
+    const bent_real_t inside = bent_clamp_drive(applied) + 0;
     if (inside < applied || inside > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8d8145f158ed9c57e69ff196dfd58a283b54d60cc1f17f3664ebc0b664b2f442, without this line
+ * Text: sha256 33d6b7ffb2ef95fbfac2c4ecdd6675ce3542ef808b823d50d71b2caad9ffeda3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -475,14 +475,10 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
-/* The actuator has moved to drive v. */
-static void curved_inverse_set_drive(curved_inverse_t *self, curved_real_t v) {
-    self->drive = v;
-}
-
 /* The actuator has moved to drive v. Returns the input of the plays. */
 static curved_play_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
-    curved_inverse_set_drive(self, v);
+    /* The actuator has moved to drive v. */
+    self->drive = v;
     return curved_front_forward(v);
 }
 

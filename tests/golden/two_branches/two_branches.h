@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 f5e172c34ae5e9f355ba0ef7b61f3c926138631aafedc5d82e22cc27c69c699c, without this line
+ * Text: sha256 40f41685e0bb4ee1943f7b65fb6d5a2b31c6b9fe47f7760c74d1588c44b10499, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -849,17 +849,6 @@ TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *sel
     }
 }
 
-/* A sample that is not finite: repeats the last returned drive. */
-static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self) {
-    two_branches_inverse_keep(self);
-    two_branches_inverse_replace(self,
-        self->stepped && self->committed ? self->returned : self->drive);
-    self->stepped = true;
-    self->committed = false;
-    self->status |= TWO_BRANCHES_STATUS_HELD;
-    return self->drive;
-}
-
 /* One sample. The memory takes the returned drive as applied at once; a commit, a limit or a held
    drive undoes the step and applies the actual drive instead.
 
@@ -870,7 +859,14 @@ static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *sel
    yes      yes        the committed drive  the committed drive  the returned drive, `returned` */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u) {
     if (!(u >= -FLT_MAX && u <= FLT_MAX)) {
-        return two_branches_inverse_hold(self);
+        /* A sample that is not finite: repeats the last returned drive. */
+        two_branches_inverse_keep(self);
+        two_branches_inverse_replace(self,
+            self->stepped && self->committed ? self->returned : self->drive);
+        self->stepped = true;
+        self->committed = false;
+        self->status |= TWO_BRANCHES_STATUS_HELD;
+        return self->drive;
     }
     two_branches_inverse_keep(self);
     if (!self->repeated || u < self->reference || u > self->reference) {
