@@ -35,7 +35,7 @@ COLUMNS = 1500
 
 @dataclass(frozen=True)
 class Base:
-    """Hysteresis before any effect: output rises by `span_out` when the drive sweeps `low` to `high`."""
+    """Hysteresis before any effect: output rises by `span_out` when the drive sweeps from `low` to `high`."""
 
     kind: str
     low: float

@@ -407,7 +407,7 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
 
 
 def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> LocalFit:
-    """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
+    """The best shape near `shape`, with non-negative weights for the plays at `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
     p = pi.non_negative(plain.whole, np.arange(len(thresholds)))

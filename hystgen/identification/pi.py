@@ -75,7 +75,7 @@ class Solution:
     sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The solution without plays of weight 0, which have no effect."""
+        """The solution without plays whose weight is 0, which have no effect."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 

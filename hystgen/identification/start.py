@@ -229,7 +229,7 @@ def memory_of(slopes: Array, r: Array) -> Array:
 
 
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
-    """Drive values that bring virgin plays of thresholds r (n+1,) to an admissible memory (n+1,).
+    """Drive values that bring virgin plays with thresholds r (n+1,) to an admissible memory (n+1,).
 
     As a function of the threshold, the memory left by a history has slopes of -1 and 1 only: going inwards from the
     outermost play, a part that falls with the threshold comes from a turn at `s + r`, a part that rises from a turn at
@@ -358,7 +358,7 @@ class _Search:
 
     @classmethod
     def of(cls, courses: Sequence[Course], r: Array, known: Array | None) -> _Search:
-        """The search for the courses, as seen by plays of thresholds r (n+1,), from their beginning."""
+        """The search for the courses, as seen by plays with thresholds r (n+1,), from their beginning."""
         return cls(tuple(_System.of(_whole(item), r) for item in courses), r, known)
 
     @property

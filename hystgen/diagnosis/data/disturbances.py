@@ -328,7 +328,7 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | R
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
-    """Like `lines`, but only steady lines and ripples that dominate the errors; the actuator does not cause these."""
+    """Like `lines`, but only for steady lines and ripples that dominate the errors, not caused by the actuator."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 

@@ -40,7 +40,7 @@ class NoiseFloor:
 
 
 def noise_floor(items: Sequence[Item]) -> NoiseFloor:
-    """The noise of the measured outputs of several records."""
+    """The noise in the measured outputs of several records."""
     holds = _pooled([part for item in items for part in _holds(item)], acceptance.QUIET_HOLDS)
     differences = _pooled([part for item in items for part in _differences(item)], 0.5)
     periods = _pooled([part for item in items for part in _periods(item)], 0.5)
@@ -234,7 +234,7 @@ def _moves(v: Array) -> tuple[Places, Places]:
 
 
 def _between_ends(turns: Places) -> Places:
-    """All turns but the first: the move to the first turn may begin anywhere."""
+    """All turns but the first, since the move to that one may begin anywhere."""
     return turns[1:] if len(turns) > 1 else turns
 
 

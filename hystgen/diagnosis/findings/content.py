@@ -250,7 +250,7 @@ Set by: benchmarks/chosen_numbers.py lengths."""
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable that an error may depend on: its name, and its values over a record."""
+    """A variable on which an error may depend, with its name and its values over a record."""
 
     name: str
     of: Callable[[Item], Array]

@@ -45,7 +45,7 @@ LOOP = 0.1
 
 WITHIN = 0.01, 1.0
 """[fractions of the drive range] Smallest and largest distance over which the element forgets: below, it acts like
-plays of the smallest thresholds; above, like a straight line and a memory of the start."""
+plays with the smallest thresholds; above, like a straight line and a memory of the start."""
 
 STARTS = 5
 """[widths] Number of widths from which a search starts, each about three times the previous one."""
