@@ -65,7 +65,7 @@ def _log(rng: Generator, low: float, high: float) -> str:
 
 
 def drawn(name: str, seed: int) -> Model:
-    """A random model of plays with an effect, about half of them behind a memoryless part."""
+    """A random model of plays with an effect; about half of all models have a memoryless part in front."""
     rng = np.random.default_rng([seed, sum(map(ord, name))])
     n = int(rng.integers(3, 9))
     thresholds = np.append(0.0, np.cumsum(rng.uniform(0.1, 0.6, n))).round(3).tolist()
@@ -125,7 +125,7 @@ class Measured:
         self.double = tables.build(model.chain, "float64", T)
 
     def given(self, x: Array, unit: float) -> Array:
-        """The numbers of the arithmetic nearest to x."""
+        """The arithmetic's numbers nearest to x."""
         return np.rint(x / unit) if self.compiled.codes else np.float32(x).astype(float)
 
     def _extra(self, one: Compiled) -> dict[str, Array]:

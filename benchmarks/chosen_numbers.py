@@ -79,7 +79,7 @@ MOVING_PLAYS = (
 
 
 def lag() -> None:
-    """Both inverses of a lag of 1 s: largest gain from reference to drive, and the error on a sine of 40 steps."""
+    """Largest gain from reference to drive and error on a sine of 40 steps, for both inverses of a lag of 1 s."""
     print("lag: step / time constant, pole of the exact inverse, its gain and that of the lead, error of the lead, %")
     for step in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
         block = UnevenLag(Lag(name="lag", time_constant=1.0))
@@ -110,7 +110,7 @@ def newton() -> None:
 
 
 def decades() -> None:
-    """The table of a logarithmic gain that loses 5 % per decade: pieces, bytes in float32, the gain at its end."""
+    """The table of a logarithmic gain that loses 5 % per decade: its pieces, bytes in float32, and gain at the end."""
     print("decades: decades, pieces, bytes, gain at the end")
     effect = LogarithmicAgeing(name="ageing", loss=0.05, travel=1.0)
     whole = ageing.pieces(effect)
@@ -169,7 +169,7 @@ def exact() -> None:
 
 
 def lengths() -> None:
-    """Fractions of a play sum's error explained without and with rates, on three rate-independent plants and one with
+    """Fractions of a play sum's error explained with and without rates, on three rate-independent plants and one with
     creep."""
     print("lengths: plant, error explained without rates / with them, by averages over 0, 2, 3, 4, 6 and 11 distances")
     t = 1e-3 * np.arange(12000)
@@ -217,7 +217,7 @@ def visits() -> None:
 
 
 def quiet() -> None:
-    """Error of a quiet drive on slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
+    """Error with a quiet drive on slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
 
     The error is the rms difference between the output and the rounded reference, in output codes, from 1 s on.
     """
@@ -367,7 +367,7 @@ def noisy() -> None:
 
 
 def fast() -> None:
-    """Change of the output, in % of its range, due to effects that settle within a sample, at the fastest rate with a
+    """Change in the output, in % of its range, due to effects that settle within a sample, at the fastest rate with a
     stated bound."""
     shapes = ("lag, time_constant", "delay, time", "rate_dependence, shape: relaxation, time_constant")
     print("fast: step / time constant; lag, delay, relaxing plays")

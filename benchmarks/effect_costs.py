@@ -35,7 +35,7 @@ from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
 INSIDE = {"quiet": "lag", "friction": "heat"}
-"""Parts of the code that only occur together with another part."""
+"""Parts of the code that occur only together with another part."""
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
@@ -62,9 +62,9 @@ EFFECTS = {
     "delay": "name: delay, time: 2.6e-3",
     "quiet": "name: lag, time_constant: 0.01",
 }
-"""A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
+"""A model with one effect for each part that `hystgen.compensator.chain.costs` counts."""
 OTHERS = {"dilated": "0", "polynomial": "[0.02]"}
-"""The value, once for each play but the first."""
+"""The value to be repeated for each play but the first."""
 assert {"any", *EFFECTS} == set(PARTS)
 
 

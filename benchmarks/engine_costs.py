@@ -95,7 +95,7 @@ def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> 
 
 
 def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:
-    """Bytes of code of a module without its constant tables on each core, the larger of both compilers."""
+    """Bytes of code in a module without its constant tables, on each core, the larger of both compilers' sizes."""
     one = model(CODE_PLAYS, FRONTS[kind])
     assert engines.kind(one.cascade, arithmetic) == kind
     options = emit_options(one, operator, arithmetic, engine)

@@ -142,7 +142,7 @@ def relays(v: Array, drives: Array) -> Array:
 
 
 def cubic(v: Array, drives: Array) -> Array:
-    """A polynomial of third degree and plays."""
+    """A cubic polynomial, and plays."""
     x = v / np.max(np.abs(drives))
     return np.column_stack([x**2, x**3, plays(v, drives)])
 
@@ -159,7 +159,7 @@ BASELINES: dict[str, Callable[[Array, Array], Array]] = {
 
 
 def baseline(columns: Callable[[Array, Array], Array], fit: Sequence[Compared], held: Sequence[Compared]) -> float:
-    """Held-out error of the least-squares fit with these columns and an offset a record."""
+    """Held-out error of the least-squares fit with these columns and an offset per record."""
     drives = np.concatenate([each.record.v for each in fit])
     rows, targets = [], []
     for each in fit:
@@ -173,7 +173,7 @@ def baseline(columns: Callable[[Array, Array], Array], fit: Sequence[Compared], 
 
 @dataclass(frozen=True)
 class Compared:
-    """A recording and which of its samples are compared."""
+    """A recording, and which of its samples are compared."""
 
     record: Record
     compared: NDArray[np.bool_]

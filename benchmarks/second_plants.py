@@ -60,7 +60,7 @@ def _triangle(t: Array, periods: float) -> Array:
 
 
 def drives(rng: np.random.Generator) -> list[tuple[str, bool, Callable[[Array], Array]]]:
-    """Name, held out or not, and drive from 0 to 1 as a function of the elapsed fraction of the record's time."""
+    """Name, whether held out, and drive from 0 to 1 as a function of the elapsed fraction of the record's time."""
     levels = rng.uniform(0.0, 1.0, 6)
     more = rng.uniform(0.0, 1.0, 5)
     phases = rng.uniform(0.0, TAU, 5)
@@ -187,7 +187,7 @@ class Stage:
         return self.friction * out
 
 
-# Effects, each by an equation of its own, with a strength ----------------------------------------------------
+# Effects, each with an equation of its own and a strength ----------------------------------------------------
 
 
 @dataclass
@@ -402,8 +402,8 @@ def beside_steps(x: Array) -> NDArray[np.bool_]:
 def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = False) -> float:
     """rms residual of a linear least-squares fit of plays with weights of any sign and an offset per record.
 
-    All records together, each from the later of its two extremes on; thresholds up to half the range. `without_steps`:
-    without the samples `beside_steps`.
+    All records are fitted together, each from the later of its two extremes on, with thresholds up to half the range.
+    `without_steps`: leave out the samples `beside_steps`.
     """
     tables, targets = [], []
     for one, drive in zip(y, v, strict=True):

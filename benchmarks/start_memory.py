@@ -162,8 +162,8 @@ def fitted(made: Case, history: tuple[float, ...] | None) -> tuple[float, dict[s
 def open_spread(made: Case, known: bool) -> dict[str, float]:
     """Posterior standard deviation of the held-out outputs, rms over their samples, output units.
 
-    Everything is Gaussian: noise as in the records; slopes of the start memory over the thresholds with their bound, 1,
-    as standard deviation; a density of the weights that changes slowly (`SMOOTH`).
+    Everything is Gaussian: noise as in the records; the start memory's slopes over the thresholds, with their bound, 1,
+    as standard deviation; and a weight density that changes slowly (`SMOOTH`).
     """
     r = np.linspace(0.0, 0.5 * HIGH, FINE + 1)
     v = made.record.v

@@ -53,8 +53,8 @@ SEARCHED = 200_000  # samples per round of the search for the worst case
 # 16 plays no other trial has more than 18 samples, with 128 plays there are corner lists on either side
 LONG = 100
 # [trials] Number of the most expensive trials whose neighbours the next round tries. For the inverse of 8 plays in
-# float32 on a Cortex-M4F 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`): 30 is
-# three times what was needed, for little more time
+# float32 on a Cortex-M4F, 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`), so 30
+# is three times the number needed and takes little more time
 KEPT = 30
 RANGE = 10.0  # half of the drive range
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}
@@ -83,7 +83,7 @@ Reals = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Figures:
-    """One build: instructions of a sample (mean and max over a signal), and bytes."""
+    """One build, with instructions per sample (mean and max over a signal) and bytes."""
 
     target: str
     compiler: str
@@ -169,7 +169,7 @@ def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
 def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
     """Inputs of the operator that give the plays the input `drive`, measured from the middle of the range.
 
-    In a range from 0, references of the inverse go on beyond the ends of the range with the slope of the first weight.
+    In a range from 0, references of the inverse continue beyond its ends with the slope of the first weight.
     """
     drive = case.middle + drive
     if case.operator == "forward":
@@ -181,8 +181,8 @@ def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
 
 
 def blocks(n: int) -> Iterator[list[int]]:
-    """Sizes of the blocks of a corner list, the one with the largest thresholds first: equal blocks of 1, 2, 4 .. n
-    plays, and a large block among single plays, since a search bisects the blocks first and then the plays of a
+    """Sizes of the blocks in a corner list, the one with the largest thresholds first: equal blocks of 1, 2, 4 .. n
+    plays, and a large block among single plays, since a search bisects the blocks first and then the plays in a
     block."""
     size = 1
     while size <= n:
@@ -195,8 +195,8 @@ def blocks(n: int) -> Iterator[list[int]]:
 
 def corner_lists(n: int) -> Iterator[Reals]:
     """Drives that leave a corner list: swings that move every play, or rest, then turning points of a shrinking
-    oscillation, each of which leaves a block behind; all also upside down. No jump can wipe out the whole list left by
-    full swings, but one can after shorter swings or from rest."""
+    oscillation, each of which leaves a block behind; and the same drives upside down. No jump can wipe out the whole
+    list left by full swings, but one can after shorter swings or from rest."""
     r = np.asarray(model(n).cascade.pi.thresholds)
     for sizes in blocks(n):
         turns = n - np.cumsum(sizes[:-1])
@@ -238,8 +238,8 @@ def landings(case: Case, points: Reals, most: int = 129) -> Reals:
 
 
 def trials(case: Case) -> Iterator[Reals]:
-    """Every corner list followed by a jump: the search for the jump's end is a sample's work."""
-    # first uneven blocks, which no rule makes, from random turning points, small among large, few and many
+    """Every corner list followed by a jump; the search for the jump's end is the work of one sample."""
+    # first, uneven blocks, which no rule makes, from random turning points: small among large, few or many
     rng = np.random.default_rng(11)
     for size in [*rng.integers(4, 12, 2000), *[LONG] * 600]:
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
@@ -402,7 +402,7 @@ def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
 
 
 Form = Callable[[Case, Sequence[Reals]], tuple[Any, Any, list[int]]]
-"""Function that makes operations, arguments and the end of each trial from trials."""
+"""Function that returns operations, arguments and the end of each trial, given the trials."""
 
 
 class Bench:
@@ -566,8 +566,8 @@ class Bench:
         return self._worst[case]
 
     def _worst_interrupted(self, case: Case, behind: bool) -> list[Reals]:
-        """The same for interrupted trials, including the worst uninterrupted ones; `behind`: ranked by a NaN or
-        infinity right after a commit, otherwise by all other samples."""
+        """Like `_worst_trials`, but for interrupted trials and the worst uninterrupted ones; `behind`: ranked by a NaN
+        or infinity right after a commit, otherwise by all other samples."""
         case = self._searched(case)
         if (case, behind) not in self._worst_odd:
             real = ARITHMETICS[case.arithmetic].number
@@ -656,7 +656,7 @@ def measure(
     arithmetics: Sequence[str],
     samples: int,
 ) -> list[Figures]:
-    """Figures of all combinations; compilers that are not installed are skipped with a message."""
+    """Figures for all combinations; compilers that are not installed are skipped with a message."""
     found: list[Figures] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-bench-") as folder:
         bench = Bench(Path(folder))
@@ -689,7 +689,7 @@ def measure(
 
 
 def read(paths: Iterable[Path]) -> list[Figures]:
-    """The figures of written tables, in the order of a run that measures all of them."""
+    """The figures in written tables, in the order of a run that measures all of them."""
     found = []
     for path in paths:
         with path.open(newline="", encoding="ascii") as file:
@@ -705,8 +705,8 @@ def key(f: Figures) -> tuple[Any, ...]:
 
 
 def table_text(figures: Iterable[Figures]) -> str:
-    """A row for each operator and n: mean / max over the multisine, and the worst cases, also for a NaN after a commit,
-    for a range from 0 and for a commit."""
+    """A row for each operator and n: mean / max over the multisine, and the worst cases, including those for a NaN
+    after a commit, a range from 0 and a commit."""
     rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
     for f in figures:
         rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else f.signal] = f
@@ -741,12 +741,12 @@ GOALS: dict[int, dict[str, float]] = {
     16: {"fine": 28, "coarse": 42, "walk": 112, "worst case": 340, FROM_0: 440, BEHIND: 440, "commit": 440},
     128: {"fine": 32, "coarse": 51, "walk": 136, "worst case": 400, FROM_0: 425, BEHIND: 500, "commit": 500},
 }
-"""Instructions of a float32 inverse on a Cortex-M4F, by number of plays: means over the signals of MEANS, most
+"""Instructions of a float32 inverse on a Cortex-M4F, by number of plays: means over the signals in MEANS, and the most
 expensive samples of the others. In a range from 0, moves end at a limit."""
 
 
 def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
-    """Goals for the inverse: words, figure, most allowed."""
+    """Goals for the inverse, each with its description, the figure and the largest value allowed."""
     found = {(f.target, f.compiler, f.engine, f.n, f.signal, f.arithmetic): f for f in figures
              if f.operator == "inverse"}  # fmt: skip
 
@@ -770,7 +770,7 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
 
 
 def plot(figures: Sequence[Figures], path: Path) -> None:
-    """Instructions of zig's inverse against n, a panel for each core: textbook loop, both engines, worst case; q31."""
+    """Instructions of zig's q31 inverse against n, a panel for each core: textbook loop, both engines, worst case."""
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -38,8 +38,8 @@ class PI(PlaySum):
 class Cascade(StaticModel):
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the range of drives in which it is used (two numbers, or unbounded). `simulate` runs it, `inverse`
-    gives the compensator.
+    `input_range`: the range of drives in which it is used (two numbers, or unbounded). `simulate` runs it, and
+    `inverse` returns the compensator.
     """
 
     pi: PI
@@ -47,7 +47,7 @@ class Cascade(StaticModel):
     def simulate(self, v: ArrayLike, clamp: bool = False) -> Array:
         """Output for the drive samples `v` (N,) from the start memory, in double precision; `clamp` limits the drive.
 
-        Warns (`SampleWarning`) of drives outside `input_range`, and of non-finite samples, which repeat the last drive.
+        Warns (`SampleWarning`) of drives outside `input_range` and of non-finite samples, which repeat the last drive.
         """
         y, said = remarks.run(Session(self, "forward", clamp=clamp), v)
         remarks.tell(said)

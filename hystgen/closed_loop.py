@@ -68,7 +68,7 @@ class LoopPart(Protocol):
 
 @dataclass(frozen=True)
 class PIController:
-    """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
+    """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, with T the loop's sample time.
 
     `kp` in controller output per error unit, `ki` in the same per second. Neither the output nor the integral is
     limited. Raises ValueError for non-finite gains.
@@ -107,7 +107,7 @@ class Response:
         return float(np.sqrt(np.mean(self._error_from(start) ** 2)))
 
     def _error_from(self, start: float) -> Array:
-        # a start that is meant to fall on a sample includes it despite rounding
+        # a start that is meant to fall on a sample must include it despite rounding
         kept = self.error[self.t >= start - 1e-9 * abs(start)]
         if not len(kept):
             raise ValueError(f"the response ends at {self.t[-1]:g} s, before {start:g} s")
@@ -278,7 +278,7 @@ class _Function:
         self._function = function
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """There is nothing to forget."""
 
     def step(self, x: float, /) -> float:
         return float(self._function(x))
@@ -367,7 +367,7 @@ def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: s
 
 
 class BitReference(_InUnits):
-    """A model's `inverse` or `forward` operator, bit for bit as in the emitted C, in Python; in physical units.
+    """A model's `inverse` or `forward` operator in physical units, computed in Python bit for bit as in the emitted C.
 
     `source`: a model or a parameter file; `arithmetic` and `engine` default to the parameter file's. Raises
     ParameterError, NotInvertibleError, FormatError, ValueError and UnsupportedEffectsError.

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[fraction of the drive's range] Largest move of the drive for a code of the reference in fixed point; more is
+"""[fraction of the drive's range] Largest move of the drive per code of the reference in fixed point; anything more is
 noise."""
 
 MOST_GAIN = 100.0
@@ -272,16 +272,16 @@ class Model:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
         Without `arithmetic` the model is computed in double precision, and the drive is limited only with `clamp`. With
-        'float32', 'float64', 'q31' or 'q15' the result is the bit reference of the emitted C, which limits the drive to
-        `input_range`; fixed point takes and returns codes.
+        'float32', 'float64', 'q31' or 'q15' the result is the bit-exact reference for the emitted C, which limits the
+        drive to `input_range`; fixed point takes and returns codes.
 
         Only effects use time and `extra`. The time is `t` (N,) in seconds, increasing, or else follows from the
         parameter file's `sample_time`; `extra`: further columns (N,) such as `temperature`. The model starts at rest at
         the first sample. Raises EffectsError if effects lack something they need, UnsupportedEffectsError for effects
         that `arithmetic` does not support.
 
-        Warns (`SampleWarning`) with the number of drives outside `input_range` and of non-finite ones, which hold the
-        drive before them.
+        Warns (`SampleWarning`) with the number of drives outside `input_range` and of non-finite ones, for which the
+        last drive is held.
         """
         y, said = self.answers(v, arithmetic, clamp, engine, t=t, extra=extra)
         remarks.tell(said)
@@ -311,7 +311,7 @@ class Model:
         self, x: ArrayLike, arithmetic: str, engine: str | None, t: ArrayLike | None,
         extra: Mapping[str, ArrayLike] | None, inverse: bool,
     ) -> Answers:
-        """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
+        """Output (N,) of the bit-exact reference for a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
 
@@ -421,9 +421,9 @@ class InverseModel:
 
         With effects the whole reference is known in advance: delays and modes look ahead in it, and the model is at
         rest at the first sample. The settings of `emit.compensation` in the parameter file apply, counted in samples of
-        the record; `quiet` changes nothing in double precision, which has no codes to dither between. The error of a
-        mode is a sixth of the fourth difference of its reference, the error of a lag a quarter of the second difference
-        of the drive behind it; everything else is exact.
+        the record; `quiet` changes nothing in double precision, which has no codes to dither between. The error in a
+        mode is a sixth of the fourth difference of its reference, and the error in a lag is a quarter of the second
+        difference of the drive behind it; everything else is exact.
         """
         v, said = self.answers(u, arithmetic, clamp, engine, t=t, extra=extra)
         remarks.tell(said)
@@ -453,10 +453,10 @@ class InverseModel:
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The samples `x` (N,), non-finite ones replaced by the last finite one before, and a mask of those replaced.
+    """The samples `x` (N,), with non-finite ones replaced by the last finite one, and a mask of those replaced.
 
-    Samples before the first finite one become `first` or, if that is None, the first finite one. `name`: what messages
-    call `x`.
+    Samples before the first finite one become `first` or, if that is None, the first finite one. `name`: the name of
+    `x` in messages.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)
@@ -490,7 +490,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
         raise TypeError(f"effects must be a list of files or classes, not {arguments.kind(sources)}; give ['own.py']")
     found: list[type[Effect]] = []
     for source in sources:
-        from hystgen.effects.user import load_user_effects  # only if needed: `emit` has to start fast
+        from hystgen.effects.user import load_user_effects  # only if needed, as `emit` has to start fast
 
         found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
     return found
@@ -511,11 +511,11 @@ class HasModel(Protocol):
 
 
 ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
-"""A model, an object with one, or the path of a parameter file."""
+"""A model, an object that has one, or the path of a parameter file."""
 
 
 def as_model(source: ModelSource) -> Model:
-    """The model given, that of a parameter file, or that of an object with a model, such as a fit.
+    """The given model, or that of a parameter file or of an object with a model, such as a fit.
 
     Raises ParameterError, and TypeError for anything else.
     """

@@ -1,4 +1,4 @@
-"""Runs a model on sampled signals, in double precision or as the bit reference of an arithmetic."""
+"""Run a model on sampled signals, in double precision or as the bit-exact reference for an arithmetic."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _simulated(
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
 ) -> Answers:
-    """Output of the bit reference of a model with effects, which takes a single record, and remarks."""
+    """Output of the bit-exact reference for a model with effects, which takes a single record, and remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records

@@ -1,4 +1,4 @@
-"""Tracking of the recorded actuator with each compensator: straight line, plays alone, whole model."""
+"""How well the recorded actuator tracks with each compensator: straight line, plays alone, whole model."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 MOST_UNKNOWN = 0.8
 """[fraction of a record] If the drive has not visited both its extremes by this point, the whole record is judged. The
-rms error over a fifth of a record of `examples/` is 0.12 to 2.0 times that over the whole record, over a twentieth 0.02
-to 3.1 times. Set by: benchmarks/chosen_numbers.py unknown."""
+rms error over a fifth of a record in `examples/` is 0.12 to 2.0 times that over the whole record; over a twentieth, it
+is 0.02 to 3.1 times that. Set by: benchmarks/chosen_numbers.py unknown."""
 
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
 """The compensators compared, each of which turns the reference into a drive."""
@@ -36,7 +36,7 @@ class Tracked:
 
     `known`: the sample by which the drive has visited both its extremes, so that the motion before the record no longer
     matters. Errors have their mean from `known` on removed, because the zero of a displacement is arbitrary. `limited`:
-    effects of range limits on each compensator's drives, one sentence each.
+    how range limits affect each compensator's drives, one sentence each.
     """
 
     name: str

@@ -4,9 +4,9 @@ Every kind starts from a continuous density p(r) of half widths, scaled to a wan
 
 * `everett`: the continuous operator itself, evaluated by its branch function B(d) = p0 d + int p(r) max(d - 2r, 0) dr
   on a stack of reversals that are removed as they are passed;
-* `maxwell`: some hundred parallel spring-slider elements with random yield points and stiffnesses; * `relays`: a
-lattice of two-state relays, in which every half width has its own shifted row of centres; * `bouc_wen`: `maxwell` with
-a small fraction of a Bouc-Wen variable, which no play sum represents exactly.
+* `maxwell`: some hundred parallel spring-slider elements with random yield points and stiffnesses;
+* `relays`: a lattice of two-state relays, in which every half width has its own shifted row of centres;
+* `bouc_wen`: `maxwell` with a small fraction of a Bouc-Wen variable, which no play sum represents exactly.
 
 `relays` can depend on the centre and `maxwell` can have nonlinear springs (not congruent); `maxwell` sliders can be
 viscous (rate dependent).
@@ -35,7 +35,7 @@ COLUMNS = 1500
 
 @dataclass(frozen=True)
 class Base:
-    """Hysteresis before any effect: output rises by `span_out` when the drive sweeps `low` to `high`."""
+    """Hysteresis before any effect: output rises by `span_out` when the drive sweeps from `low` to `high`."""
 
     kind: str
     low: float
@@ -355,7 +355,7 @@ def _bent(v: Array, yields: Array, stiffnesses: Array, strength: float, middle: 
             s = min(max(slip[i], v[k] - yields[i]), v[k] + yields[i])
             slip[i] = s
             x = (s - middle) / width
-            # wide elements bend more, so that no function of the sum gives the same output
+            # wide elements bend more, so no function of the sum gives the same output
             bend = strength * min(yields[i] / mean, 2.0)
             total += stiffnesses[i] * (s + bend * width * (math.sqrt(1.0 + x * x) - 1.0))
         out[k] = total

@@ -1,6 +1,6 @@
 """The case of a seed: bench, session, plant, noise, the nominal model, and the strength of its effects.
 
-Seeds below REPORT are for tuning, the others for reporting; nothing else separates the two blocks.
+Seeds below REPORT are for tuning and the others for reporting; the two blocks differ in nothing else.
 """
 
 from __future__ import annotations
@@ -299,7 +299,7 @@ def _scaled(
 
 
 def _logs_temperature(rng: np.random.Generator, stage: session.Session, present: list[Present]) -> bool:
-    # Some benches log it although nothing depends on it
+    # Some benches log the temperature although nothing depends on it
     decoy = bool(rng.uniform() < 0.25) and stage.bench.kind == "static"
     return decoy or any(item.effect.form == "room" for item in present)
 

@@ -1,4 +1,4 @@
-"""Drive waveforms on a fine time grid: value in [0, 1] of the drive range, beginning at a given value.
+"""Drive waveforms on a fine time grid, from 0 to 1 over the drive range, beginning at a given value.
 
 Edges of steps last some samples, so that a record resolves them, and no waveform jumps.
 """
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Drive = Callable[[np.random.Generator, Array, float, float], Array]
-"""Function of a random generator, the time in the record from 0 to 1, the start value, and a sample's fraction of the
-time."""
+"""Function of a random generator, the time in the record from 0 to 1, the start value, and the time that a sample takes
+on that scale."""
 
 
 def path(t: Array, sample: float, points: list[tuple[float, float]]) -> Array:
-    """Piecewise linear through (relative duration, value); durations are scaled to fill the record.
+    """A piecewise linear drive through (relative duration, value), with durations scaled to fill the record.
 
     Corners lie in the middle of a sample, as with a generator that shares the converters' clock.
     """

@@ -40,7 +40,7 @@ def draw(rng: np.random.Generator, noise: float, span_out: float, span: float, c
     bits = [b for b in (12, 14, 16, 18) if wide_out / 2**b <= 0.9 * noise]
     output_bits = bits[int(rng.integers(min(len(bits), 2)))]
     wide = 1.2 * span
-    # referred to the output through the loop's slope, the drive step stays well below the noise
+    # converted to output units by the loop's slope, the drive step stays well below the noise
     drive_bits = next(b for b in (12, 14, 16, 18, 20) if 0.4 * wide / 2**b * span_out / span <= 0.12 * noise)
     return Converters(
         noise,

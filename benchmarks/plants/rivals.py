@@ -91,7 +91,7 @@ def _judge(data: Data, columns: Columns, y: Array) -> tuple[float, float]:
 
 
 def _best(data: Data, rival: Rival) -> float:
-    """Held-out rms with the parameters that fit best."""
+    """Held-out rms with the best-fitting parameters."""
     starts = rival.starts(data)
     begins = np.log(starts) if rival.positive else starts
     reach = 2.0 if rival.positive else 0.5
@@ -135,7 +135,7 @@ def _lag(data: Data, x: Array) -> Array:
 
 
 def _delayed(straight: bool) -> Form:
-    """Delays the plays instead of the drive: they remember corners that fall between the samples of a delayed drive.
+    """Delay the plays instead of the drive, as they remember corners that fall between a delayed drive's samples.
 
     Between samples, straight lines suit steep edges, and Akima curves suit sines.
     """
@@ -371,7 +371,7 @@ def _none(_: Data) -> Array:
 
 
 def _times(least: float, most: float, number: int) -> Callable[[Data], Array]:
-    """Start values in samples of the fastest record."""
+    """Start values, as multiples of the fastest record's sample time."""
     return lambda data: np.geomspace(least, most, number)[:, None] / data.rate
 
 

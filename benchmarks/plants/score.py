@@ -29,7 +29,7 @@ NOTHING, UNEXPLAINED, ALIKE, MISSING = "nothing", "unexplained", "alike", "no re
 
 @dataclass(frozen=True)
 class Outcome:
-    """One case: its label, what was diagnosed (None without a result), and how the run went."""
+    """One case, with its label, what was diagnosed (None without a result), and how the run went."""
 
     label: dict[str, Any]
     found: dict[str, Any] | None
@@ -55,13 +55,13 @@ class Outcome:
         return name in alike and any({name, effect["name"]} <= group <= alike for group in self.groups)
 
     def left_open(self, effect: dict[str, Any]) -> bool:
-        """Nothing was named, but the effect was correctly reported as not separable from other names."""
+        """Whether nothing was named, but the effect was correctly reported as not separable from other names."""
         alike = {effect["name"], *effect["indistinguishable"]}
         return not self.names and any(effect["name"] in group <= alike and len(group) > 1 for group in self.groups)
 
     @property
     def first_right(self) -> bool:
-        """The first name belongs to an effect of the plant."""
+        """Whether the first name belongs to an effect of the plant."""
         if self.found is None:
             return False
         return any(
@@ -78,7 +78,7 @@ class Outcome:
 
     @property
     def exact(self) -> bool:
-        """Every effect of the plant was named, and nothing else."""
+        """Whether every effect of the plant was named, and nothing else."""
         return self.all_named and len(self.names) <= len(self.true) and not self.wrong
 
     @property
@@ -95,7 +95,7 @@ class Outcome:
 
     @property
     def overcautious(self) -> bool:
-        """An effect was reported as not separable from a name although these records separate the two."""
+        """Whether an effect was reported as not separable from a name although these records separate the two."""
         return any(
             e["name"] in group and not group <= {e["name"], *e["indistinguishable"]}
             for e in self.label["effects"]
@@ -104,7 +104,7 @@ class Outcome:
 
     @property
     def refused(self) -> bool:
-        """A record was refused as bad input and named; exit code 2 alone could also mean a wrong command line."""
+        """Whether a record was refused as bad input and named; exit code 2 alone could mean a wrong command line."""
         said = re.search(r"\.csv\b.*: error: |error: .*\.csv: ", self.run.get("stderr", ""))
         return self.run.get("exit") == 2 and said is not None
 
@@ -172,7 +172,7 @@ def load(cases: Path, labels: Path, results: Path) -> list[Outcome]:
 
 
 def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
-    """Every figure that has cases, against the limits of the project."""
+    """Every figure that has cases, against the project's limits."""
     found: list[Figure] = []
 
     def share(what: str, some: Sequence[Outcome], right: Callable[[Outcome], bool], limit: float) -> None:

@@ -67,7 +67,7 @@ class Session:
 
 
 Waveforms = list[tuple[str, drives.Drive, bool]]
-"""Name, generator, held out or not, in the order of the session."""
+"""Name, generator, and whether held out, in the order of the session."""
 
 
 def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: Waveforms) -> Session:
@@ -195,5 +195,5 @@ def _room(rng: np.random.Generator, t: Array) -> Array:
 
 
 def _round(x: float) -> float:
-    """Two significant digits, as a user would write it down."""
+    """The number rounded to two significant digits, as a user would write it down."""
     return float(f"{x:.2g}")

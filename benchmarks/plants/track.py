@@ -1,11 +1,11 @@
 """Closed simulation: the plants of the cases, driven by compensators that the package makes from their records.
 
-Records, `identify`, `diagnose`, and the inverse of both models, as the emitted C computes it (`simulate --arithmetic
-float32`, whose bits `verify` holds the C to), turn a reference that is in no record into a drive; the plant responds to
-it on its own fine grid. The package is called only through its command line.
+`identify` and `diagnose` fit models to the records; their inverses, as the emitted C computes them (`simulate
+--arithmetic float32`, to whose bits `verify` holds the C), turn a reference found in no record into a drive, to which
+the plant responds on its own fine grid. The package is called only through its command line.
 
-It prints the rms error about its mean, in per cent of the reference's range, of a straight line, of the plays that
-`identify` finds, and of the model that `diagnose` writes, and the ratio of the last two.
+It prints the rms error about its mean, in per cent of the reference's range, for a straight line, for the plays that
+`identify` finds and for the model that `diagnose` writes, and the ratio of the last two.
 """
 
 from __future__ import annotations

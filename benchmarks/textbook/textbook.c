@@ -1,7 +1,7 @@
 /*
- * What an emitted module is compared with: formula (35) as one writes it down, every play in every sample as two
- * ternaries and a product, with the same care for NaN, range and status as the emitted code. With the weights and
- * thresholds of the inverse it is the inverse, with those of the model the model; the benchmark writes the tables.
+ * The yardstick for emitted modules: formula (35) written out directly, with two ternaries and a product for every play
+ * in every sample, and with the same care for NaN, range and status as the emitted code. The inverse's weights and
+ * thresholds make it the inverse, and the model's make it the model; the benchmark writes the tables.
  */
 #include "textbook.h"
 
@@ -11,7 +11,7 @@
 
 void textbook_forward_init(textbook_forward_t *self)
 {
-    volatile textbook_real_t *play = self->play; /* or a compiler calls memset, which a bare core need not have */
+    volatile textbook_real_t *play = self->play; /* or a compiler would call memset, which a bare core may lack */
     int i;
     for (i = 0; i < TEXTBOOK_N_PLAYS; ++i) {
         play[i] = 0;

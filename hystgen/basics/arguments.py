@@ -59,7 +59,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Like `checked`, for a call that passes its `**options` on to `options_of`; its signature then lists them. `name`:
-    of the call, in messages."""
+    the call's name in messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()

@@ -1,4 +1,4 @@
-"""Output of the command line to terminals, pipes and files, and handling of the signals that end its process."""
+"""Command-line output to terminals, pipes and files, and handling of the signals that end the process."""
 
 from __future__ import annotations
 

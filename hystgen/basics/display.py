@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def block(line: str, table: str = "", draw: Callable[[], Figure] | None = None) -> str:
-    """HTML of a line and, below it, a text table and, if matplotlib is installed, the figure that `draw` makes."""
+    """HTML for a line, a text table below it and, if matplotlib is installed, the figure that `draw` makes."""
     parts = [f"<p>{html.escape(line.strip('<>'))}</p>"]
     if table:
         parts.append(f"<pre>{html.escape(table)}</pre>")

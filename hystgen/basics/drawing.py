@@ -33,7 +33,7 @@ LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }
-"""The model is a thin line over a broad one for the measurement, so both stay visible."""
+"""The model is a thin line drawn over a broad one for the measurement, so both stay visible."""
 
 STYLE = {
     "svg.hashsalt": "hystgen",
@@ -137,7 +137,7 @@ def styled() -> Iterator[None]:
     """Context for drawing and saving in the common style, whatever matplotlib's settings. Raises PlotError."""
     require()
     with _quiet():
-        from matplotlib import figure, style  # noqa: F401  # or each fork of this process would import them
+        from matplotlib import figure, style  # noqa: F401  # so that forks of this process need not import them
         from matplotlib.backends import backend_svg  # noqa: F401
 
         with style.context(["default", STYLE]):

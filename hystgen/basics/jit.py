@@ -34,25 +34,25 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Scalar: TypeAlias = float
-"""A number given to a function of any arithmetic: a real, or in fixed point a code, since an `int` is a `float` too.
-Functions for fixed point alone take and give an `int`."""
+"""A number given to a function of any arithmetic: a real, or a code in fixed point, since an `int` is a `float` too.
+Functions for fixed point alone take and return an `int`."""
 
 Element: TypeAlias = int
-"""A number out of an array, in the arithmetic that the array is of. To mypy it is an `int`, which may stand for a code
-and for a real."""
+"""A number from an array, in the arithmetic of that array. To mypy it is an `int`, which may stand for either a code or
+a real."""
 
 N = TypeVar("N", int, float)
-"""A number in the arithmetic of another one."""
+"""A number in the same arithmetic as another one."""
 
 Answer: TypeAlias = Callable[..., Scalar]
 LimitedAnswer: TypeAlias = Callable[..., tuple[Scalar, int]]
 Action: TypeAlias = Callable[..., None]
 Check: TypeAlias = Callable[..., bool]
-"""Functions of tables, memory and numbers, by what they return: a number, one and whether it had to be limited,
-nothing, or yes and no. Tables and memory differ from block to block, so callers cannot name them."""
+"""Functions of tables, memory and numbers, by what they return: a number; a number and whether it had to be limited;
+nothing; yes or no. Tables and memory differ from block to block, so callers cannot name their types."""
 
-# Called once, with a message for the user, before the first function missing from the cache is compiled, or runs as
-# Python for want of numba
+# Called once, with a message for the user, before the first function that is missing from the cache is compiled, or run
+# as Python if there is no numba
 announce: Callable[[str], None] | None = None
 
 ONCE = "compiling Python functions for this machine, once: up to 20 s, or 40 s if the C has effects"
@@ -73,7 +73,7 @@ OPTIONS: dict[str, object] = {"error_model": "numpy", "_nrt": False, "nogil": Tr
 _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
-"""[samples] Number that a process computes in Python, per function and data type, before it compiles or loads the
+"""[samples] Number that a process handles in Python, per function and data type, before it compiles or loads the
 function: 0.3 s for a plain model, whose functions take 8 s to compile, and 0.8 s with many effects, which take 80 s.
 Set by: `verify` of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
@@ -125,8 +125,8 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def interpreted(self) -> Callable[P, R]:
-        """A copy of `py_func` that calls the same kind of copy of other jitted functions. This halves the time of a
-        record: a step makes some hundred calls, each of which would have to decide how to run."""
+        """A copy of `py_func` that calls the same kind of copy of other jitted functions. This halves the time that a
+        record takes, since a step makes some hundred calls, each of which would have to decide how to run."""
         made: list[types.FunctionType] = []
         todo = [self]
         for one in todo:  # grows in the loop
@@ -203,7 +203,7 @@ def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
 def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
 def jit(function: Callable[..., object] | None = None, /, *, inline: bool = False) -> Any:
     """Compile a function; `inline` inlines it into its callers, as suits a short function: passing it a model's many
-    tables would cost more than what it computes."""
+    tables would cost more than its computation."""
     if function is None:
         return functools.partial(Jit, inline=inline)
     return Jit(function, inline)

@@ -48,7 +48,7 @@ _HEADERS = _words(
 _DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))])
 
 # The macros UPPER_... of a model with one of these names would clash with those of a standard header. Names in the
-# first group are also forbidden with an underscore and more behind them, those in the second only as they stand.
+# first group are also forbidden when an underscore and more follow, those in the second only on their own.
 _MACRO_FAMILIES = dict.fromkeys(_words("dbl dec dec32 dec64 dec128 flt ldbl"), "float")
 _MACRO_NAMES = (
     dict.fromkeys(_words("ptrdiff sig_atomic size wchar wint intptr uintptr intmax uintmax"), "stdint")
@@ -60,7 +60,7 @@ _MACRO_NAMES = (
 
 
 def name_problem(name: str) -> str | None:
-    """The fault of a model's name and how to fix it; None if the name is usable.
+    """The fault in a model's name and how to fix it; None if the name is usable.
 
     A name is the prefix of every emitted symbol (`NAME_...`) and, in upper case, of every macro, and it names
     the files `NAME.h`, `NAME.c` and `NAME_selftest.h/.c`. Case is ignored in every comparison, because macros

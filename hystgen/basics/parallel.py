@@ -155,7 +155,7 @@ class Pool(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Start one process per task, of which there are `most`, but no more than `jobs`."""
+        """Start one process for each of `most` tasks, but no more than `jobs` processes."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
@@ -168,7 +168,7 @@ class Pool(Generic[T, R]):
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
-                except OSError:  # no room for another: continue with those already running, or without any
+                except OSError:  # no room for another, so continue with those already running, or without any
                     here.close()
                     return
                 finally:

@@ -49,7 +49,7 @@ class ParameterError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A user's text as messages quote it: cut to `SHOWN` characters, then unprintable ones escaped."""
+    """A user's text as messages quote it: cut to `SHOWN` characters, with unprintable ones then escaped."""
     if len(text) > SHOWN:
         text = text[: SHOWN - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)

@@ -1,11 +1,11 @@
-"""Structures of named numbers, declared once for both the arrays of the bit reference and the structs of the C.
+"""Structures of named numbers, declared once for both the arrays of the bit-exact reference and the structs in C.
 
     class LagState(Struct):
         high: Real  # comments say what a number is, as in C
         low: Real
 
-`LagState.zeros(3, np.float32)`, a single structured array, is the memory of three lags. `s.high[1]` is a number of the
-second lag, in Python and in compiled code alike, since numba accepts structured arrays.
+`LagState.zeros(3, np.float32)`, a single structured array, is the memory of three lags. `s.high[1]` is the second lag's
+`high`, in Python and in compiled code alike, since numba accepts structured arrays.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hystgen.basics.jit import Element, Scalar, jit
 
 
 class NumberArray(Protocol):
-    """An array of numbers; which type they have is decided with the arithmetic, when tables and memory are made."""
+    """An array of numbers, whose type is chosen with the arithmetic when tables and memory are made."""
 
     @property
     def dtype(self) -> np.dtype[Any]: ...
@@ -75,7 +75,7 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
     @classmethod
     @functools.cache
     def members(cls) -> Mapping[str, tuple[type[Struct] | str, int]]:
-        """Members by name, in order: a structure or the C type without its prefix, and the length of an array or 0."""
+        """Members by name, in order: a structure or the C type without its prefix, and an array's length, or 0."""
         found: dict[str, tuple[type[Struct] | str, int]] = {}
         for name, hint in get_type_hints(cls, include_extras=True).items():
             if get_origin(hint) is Annotated:

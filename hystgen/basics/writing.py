@@ -2,8 +2,8 @@
 
 Everything is written to a staging folder next to its destination and then renamed. The staging folder is removed when
 the work ends, even with an error; if a process was killed, the next one that writes to the same folder removes the
-leftovers. A lock in the staging folder, which the system releases with the process, tells leftovers from a folder in
-use.
+leftovers. A lock in the staging folder, which the system releases when the process ends, tells leftovers from a folder
+in use.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
 
 
 def check_files(folder: Path, names: Iterable[str]) -> None:
-    """Raise the OSError that writing these files into `folder` would raise, as far as it can be foreseen."""
+    """Raise the OSError that writing these files into `folder` would raise, insofar as it can be foreseen."""
     around = destination(folder) if folder.is_symlink() else folder
     while not around.exists() and around != around.parent:
         around = around.parent

@@ -63,14 +63,14 @@ def diagnose(
 
     `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
     for `identify` and converted to the model's units; `holdout`: records with other waveforms, by which models are
-    judged; if none are given, or too few of their samples can be compared, every third record, or the end of each, is
+    judged; if none are given, or too few of their samples can be compared, every third record or the end of each is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
     `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
     although their drive still moves the plays. `effects`: further effects to try.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
-    weights to the free-run error, and accepted if it removes a substantial part of the held-out error and the gain is
-    not due to chance. Raises RecordError, IdentificationError, ValueError.
+    weights so as to minimise the free-run error, and accepted if it removes a substantial part of the held-out error
+    and the gain is not due to chance. Raises RecordError, IdentificationError, ValueError.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 4.0, 4000)
@@ -211,7 +211,7 @@ class _Case:
         """The search from the nominal model, or from that model without its front if the front misleads the search.
 
         A front fitted to one loop may have absorbed an effect. If held-out records are predicted better without the
-        front, the search without it is used if it finds effects but no new front, and otherwise the better one.
+        front, the search without it is used if it finds effects but no new front; otherwise the better search.
         """
         ready, refit, bare = self._begun(history)
         if bare is not None and selection.better(bare(ready), refit(ready), ready.held):

@@ -156,9 +156,9 @@ def identify_batch(
     of `identify`.
 
     A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
-    does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
-    After an interrupted call, all files are complete and finished units are kept. When an existing parameter file is
-    rewritten, its description, `sample_time` and `emit` are kept.
+    does not repeat finished work, as long as the record, options and tool version are the same and the files are
+    unchanged. After an interrupted call, all files are complete and finished units are kept. When an existing parameter
+    file is rewritten, its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error (logarithm of %) far above the
     others, or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units, none is
@@ -245,7 +245,7 @@ def _jobs(
 
 
 def _expanded(source: str) -> list[Path]:
-    """The files that a path, a folder or a pattern refers to, sorted."""
+    """The files to which a path, a folder or a pattern refers, sorted."""
     path = Path(source)
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]

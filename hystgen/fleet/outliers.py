@@ -32,8 +32,8 @@ LEAST_ERROR = 1e-6
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure to compare units by: name in words and column. Of an `error`, the logarithm is compared, and only high
-    values count."""
+    """A figure by which to compare units, with its name in words and its column. For an `error`, logarithms are
+    compared, and only high values count."""
 
     words: str
     column: str

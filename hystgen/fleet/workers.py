@@ -166,8 +166,8 @@ def _figures(fit: Fit, model: Model) -> dict[str, object]:
 def _begin(folder: str, parent: int) -> None:
     """Set up a worker process; the process that started it, `parent`, ends it and cleans up.
 
-    Ctrl-C reaches all processes of a terminal, so workers ignore it. Temporary files go into a folder that the parent
-    removes. A worker ends when its parent is killed, instead of waiting forever to deliver its results.
+    Ctrl-C reaches every process attached to the terminal, so workers ignore it. Temporary files go into a folder that
+    the parent removes. A worker ends when its parent is killed, instead of waiting forever to deliver its results.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
@@ -230,7 +230,7 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the cluster libraries from logging tracebacks of errors that we report in one line."""
+    """Keep the cluster libraries from logging tracebacks for errors that we report in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
     before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
     for logger in before:
@@ -276,8 +276,8 @@ async def _answer(address: str) -> None:
 def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> Generator[UnitResult, None, None]:
     """Results in order of completion, from the workers of a Dask scheduler.
 
-    Only as many tasks are in flight as the workers need next, so that few records are in memory. Dask repeats the tasks
-    of a dying worker; a unit that keeps killing workers counts as failed. Raises SchedulerError.
+    Only as many tasks are in flight as the workers need next, which keeps the number of records in memory small. Dask
+    repeats the tasks of a dying worker; a unit that keeps killing workers counts as failed. Raises SchedulerError.
     """
     from distributed import as_completed
     from distributed.scheduler import KilledWorker

@@ -55,8 +55,8 @@ MOST_BREAKS = 64
 """Maximum number of breaks in a dead-zone sum, eight times as many as are tried by default."""
 
 BEYOND = 0.1
-"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a fraction of that range; farther
-out, every model is a guess."""
+"""Largest excursion by which a held-out part of a record may leave the fitted drive range, as a fraction of that range;
+farther out, every model is a guess."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -84,15 +84,15 @@ def identify(
 ) -> Fit:
     """Fit a model to measured records.
 
-    - `records`: one or more of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of shape
-      (N,), an array (N, 3), or a `Record`; all but the last are read with `columns`, `sample_time` (s), `delimiter`.
-      Each record gets a free offset.
+    - `records`: one or more records, each a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y)
+      of shape (N,), an array (N, 3), or a `Record`; all but the last are read with `columns`, `sample_time` (s),
+      `delimiter`. Each record gets a free offset.
     - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest of
       them whose held-out error is within 3 % of the best.
     - `thresholds`: the number of plays without r_0, or a list of thresholds (with a memoryless part, in terms of its
       output; that part preserves the length of the drive range and the position of 0); by default both number and
       thresholds are chosen by blocked validation on the records.
-    - `breaks`: the number of points at which a dead-zone sum may bend, or their drives; by default chosen the same way.
+    - `breaks`: the number of points at which a dead-zone sum may bend, or the drives there; by default chosen likewise.
     - `holdout`: records that affect only the choice of the model by `auto` and of one or two branches for `gpi-tanh`.
       Without them, a trial model is fitted without the last quarter of each record, which gives the held-out figures;
       the model written is then fitted to everything.
@@ -233,13 +233,13 @@ class _Tried:
 
 
 def auto(courses: Sequence[Course], held: Sequence[Course]) -> FittedModel:
-    """The model that `identify` chooses among all kinds by held-out courses. Raises IdentificationError."""
+    """The model of any kind that `identify` chooses on held-out courses. Raises IdentificationError."""
     tried = [_best(courses, held, kind, gpi.How(None, None, P0_FLOOR)) for kind in gpi.KINDS]
     return tried[_choose(tried)].fitted
 
 
 def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: gpi.How) -> _Tried:
-    """Fit one kind to courses and compare it with held-out courses, which choose among fits of `gpi.to_judge`."""
+    """Fit one kind to courses and compare it with held-out courses, which decide between fits of `gpi.to_judge`."""
     found = gpi.to_judge(courses, kind, how)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
@@ -458,7 +458,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 
 def identifier_from(text: str) -> str:
-    """A C identifier made from any text, such as a file's stem; `stage` if no usable character remains."""
+    """A C identifier made from any text, such as a file's stem, or `stage` if no usable character remains."""
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"

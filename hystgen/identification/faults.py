@@ -39,7 +39,7 @@ AT_ONCE = 0.7
 """Each of an outlier's two jumps covers at least this fraction of its distance from the line between its neighbours."""
 
 TAIL, NORMAL_TAIL = 0.98, 2.326
-"""A quantile of the deviations, and its value for a normal distribution with standard deviation 1."""
+"""Order of a quantile of the deviations, and its value for a normal distribution with standard deviation 1."""
 
 STEP, STEP_OF_RANGE = 3.0, 0.02
 """A step of the drive exceeds `STEP` times the quantile `TAIL` of its moves, and `STEP_OF_RANGE` times its range."""
@@ -62,7 +62,7 @@ OUT_OF_SCALE = 3.0
 
 
 def most(samples: int) -> int:
-    """Maximum number of samples of a record that may be rejected as isolated."""
+    """Maximum number of samples in a record that may be rejected as isolated."""
     return max(FEW, math.ceil(MOST_OUTLIERS * samples))
 
 
@@ -136,14 +136,14 @@ def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
 def _stands_out(x: Array, first: int, last: int) -> bool:
     """Whether samples [first, last) jump away and back abruptly, by far more than the signal moves around them.
 
-    The tip of a triangle does not count, nor does a move of a few samples that a model misses.
+    The tip of a triangle does not count, nor does a move of a few samples that a model does not predict.
     """
     jump, away = _jump(x, first, last)
     if jump < AT_ONCE * float(np.max(away)):
         return False
     before, after = np.diff(x[max(first - AROUND, 0) : first]), np.diff(x[last : last + AROUND])
     around = np.sort(np.abs(np.concatenate([before, after])))
-    # inside a record, the two largest steps may be a nearby outlier's; at an end, a transient is fastest there
+    # inside a record, the two largest steps may be a nearby outlier's; at an end, a transient is at its fastest
     fewer = 1 if first == 0 or last == len(x) else 3
     return len(around) >= 3 and bool(jump > CLEAR * around[-fewer])
 
@@ -318,7 +318,7 @@ BRIDGED, NOT_COMPARED = "v without a response in y, bridged", "y far from the ne
 
 
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
-    """The sentence that counts isolated wrong samples, given their indices."""
+    """The sentence that gives the number of isolated wrong samples; `found`: their indices."""
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
 
 
@@ -439,7 +439,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
 
 
 def rails(y: Array, v: Array) -> list[tuple[str, float]]:
-    """Ends of the output's range, with levels, where many consecutive samples are equal while the drive moves on
+    """Ends of the output's range, with their levels, where many consecutive samples are equal while the drive moves on
     outwards.
 
     An end reached and left by a step does not count, since that is a drop-out; nor does an end at which the drive just

@@ -252,7 +252,7 @@ class Used:
         )
 
     def sentences(self) -> list[str]:
-        """The sentences that count isolated wrong samples."""
+        """The sentences that give the numbers of isolated wrong samples."""
         return [
             faults.sentence(self.name, found, what)
             for found, what in ((self.bridged, faults.BRIDGED), (self.outliers, faults.NOT_COMPARED))

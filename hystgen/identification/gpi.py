@@ -41,8 +41,8 @@ LEAST_SLOPE = 0.1
 
 @dataclass(frozen=True)
 class How:
-    """The options of a fit: `wanted`, the number or the thresholds of plays, and `breaks`, None to let the records
-    decide; `floor`: smallest fraction of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
+    """The options of a fit: `wanted` (number or thresholds of plays) and `breaks`, None to let the records decide;
+    `floor`: smallest share of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
 
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
@@ -146,7 +146,7 @@ def _finished(
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # the same with a front
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # a front does not change it
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -204,7 +204,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
 
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
     with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
-    lies behind the plays). The problem is convex, but it minimises an error of the drive, and noise of the output
+    lies behind the plays). The problem is convex, but it minimises an error in the drive, and noise in the output
     enters the plays, so its solution is only a starting point for the fit of the output. None if no sample remains.
     """
     low, high = front.drive

@@ -1,7 +1,7 @@
 """Joint fit of a front's shape and the plays' weights: least squares on the free-run output error.
 
 The weights enter linearly, the shape does not. The method is Gauss-Newton with a trust region; every step solves for
-all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives with
+all weights and the change in shape at once, under the constraints that keep the model invertible. Derivatives with
 respect to the shape are differences between free runs, so they include the effect of earlier samples through the plays.
 """
 
@@ -46,7 +46,7 @@ SMOOTH = 16
 slopes of neighbouring pieces differ by at most a fifth."""
 
 FLATTEST = 3.0
-"""Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
+"""Largest argument of a tanh within the drive range; there, its slope is a hundredth of its largest."""
 
 CURVED = (0.02, 3.0)
 """Smallest and largest half drive range in units of the tanh's argument."""
@@ -78,7 +78,7 @@ class Front(Protocol):
 
 
 class _Bounded:
-    """Fronts that are increasing everywhere within their bounds."""
+    """Fronts that increase everywhere within their bounds."""
 
     def slack(self, shape: Array) -> Array:
         """No further constraints."""
@@ -159,7 +159,7 @@ class DeadZones(_Bounded):
 class Ends(_Bounded):
     """A limiter: a straight line that becomes flatter near the ends of the drive range, made of two dead zones (41).
 
-    The shape is the length of each flatter end, as a fraction of the range, and the logarithm of outer to inner slope.
+    The shape is the length of each flatter end, as a fraction of the range, and log(outer slope/inner slope).
     """
 
     drive: tuple[float, float]
@@ -328,8 +328,8 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 
 
 DIFFERENCE = 2.0**-16
-"""Change of a shape parameter for a derivative; shape parameters are of order one. A search needs only a few digits of
-a derivative: here curvature affects the sixth digit, and the output keeps eleven digits above rounding."""
+"""Change in a shape parameter to find a derivative; shape parameters are of order one. A search needs only a few digits
+of a derivative: here curvature affects the sixth digit, and the output keeps eleven digits above rounding."""
 
 MOST_STEPS = 25
 """Maximum number of steps of a search. For `examples/stage_recording.csv`, fronts take 2 to 10."""
@@ -407,7 +407,7 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
 
 
 def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> LocalFit:
-    """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
+    """The best shape near `shape`, with non-negative weights for the plays at `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
     p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
@@ -477,7 +477,7 @@ def search(
 
 
 def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
-    """A solution of a linear system, rounded to the digits that the records determine; `sizes`: lengths of the system's
+    """A linear system's solution, rounded to the digits that the records determine; `sizes`: lengths of the system's
     columns.
 
     The rounding units are powers of two, at most `most`. The last bits from linear algebra libraries differ between
@@ -504,7 +504,7 @@ def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thr
     columns = np.arange(len(thresholds))
     best = pi.non_negative(system.whole, columns)
     rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
-    # not `best` but `p`, with which the derivatives were taken: the next step starts from it
+    # not `best` but `p`, with which the derivatives were taken, since the next step starts from it
     return LocalFit(shape, p, rms, best, system.samples, lambda: system)
 
 
@@ -555,7 +555,7 @@ def _rows_with_derivatives(
 
 
 def solve_linear(system: Array, p: Array, shape: Array, limits: Limits, damping: float) -> tuple[Array, Array]:
-    """Change of the shape, and new weights, that fit a linear system best under the constraints."""
+    """Change in the shape, and new weights, that fit a linear system best under the constraints."""
     k, m = len(p), len(shape)
     matrix, target = system[:, :-1], system[:, -1]
     tied = np.zeros((m, k + m))

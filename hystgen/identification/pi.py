@@ -75,7 +75,7 @@ class Solution:
     sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The solution without plays of weight 0, which have no effect."""
+        """The solution without plays whose weight is 0, which have no effect."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
@@ -247,7 +247,7 @@ def _direction(turns: Sequence[_Turn], both: bool) -> int:
 
 
 def _deviation(error: Array, noise: Array, row: Array) -> float:
-    """Standard deviation of a fitted coefficient, `row @ width`, from the noise of the widths, or from their scatter if
+    """Standard deviation of a fitted coefficient, `row @ width`, from the noise in the widths, or from their scatter if
     that is larger."""
     spare = len(error) - (2 if len(error) > 2 else len(error))
     scatter = math.sqrt(float(error @ error) / spare) if spare > 0 else 0.0
@@ -258,7 +258,7 @@ def _deviation(error: Array, noise: Array, row: Array) -> float:
 class _Turn:
     """The two legs of the drive on either side of a turning point, over the drive range `span` that both cover.
 
-    `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: delay of the way down in samples;
+    `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: delay of the former, in samples;
     `deviation`: standard deviation of the mean width due to the noise of the output.
     """
 
@@ -269,7 +269,7 @@ class _Turn:
 
     @property
     def speed(self) -> float:
-        """Change of the drive per sample."""
+        """Change in the drive per sample."""
         return self.span / abs(self.later)
 
 
@@ -511,7 +511,7 @@ def _least_squares(matrix: Array, target: Array) -> Array:
 
 
 def residual(system: Array, columns: Columns, weights: Array) -> float:
-    """Sum of squared errors of the weights on a system."""
+    """Sum of squared errors that the weights leave in a system."""
     return float(np.sum((system[:, columns] @ weights - system[:, -1]) ** 2))
 
 
@@ -615,7 +615,7 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
 
 
 def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Bounds on single unknowns, without infinite ones, as the inequalities of `least_squares`."""
+    """Bounds on single unknowns, without infinite ones, in the form of inequalities for `least_squares`."""
     k = len(lower)
     eye = np.eye(k)
     below, above = np.isfinite(lower), np.isfinite(upper)

@@ -121,7 +121,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
 
 
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
-    """The course without the samples at the ends of a converter's range; name, level and number of samples of each end.
+    """The course without samples at the ends of a converter's range, and the name, level and sample count of each end.
 
     Raises IdentificationError if too few samples remain.
     """
@@ -246,8 +246,8 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
 
 def _neither(error: Array, less: Array) -> bool:
-    """Whether outputs lie farther from the predictions with and without a pulse of the drive than these two lie apart,
-    so that neither following the drive nor lagging behind it explains them."""
+    """Whether outputs lie farther from both predictions, with and without a pulse of the drive, than these lie from
+    each other, so that neither following the drive nor lagging behind it explains them."""
     known = np.isfinite(error)
     nearer = np.minimum(np.abs(error[known]), np.abs(less[known]))
     return bool(known.any() and (nearer > np.abs(error[known] - less[known])).all())

@@ -131,8 +131,8 @@ def settled(v: Array, reach: float) -> int:
     """First sample from which an unknown start memory affects the plays only by an offset.
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact. Once it has visited its own largest
-    and smallest value, plays with larger thresholds never move again in this record: they are constant. The earlier
-    sample counts. Values within `AS_FAR` of each other are equal, so that noise does not decide between turns.
+    and smallest values, plays with larger thresholds are constant, as they never move again in this record. The earlier
+    sample counts. Values within `AS_FAR` of each other count as equal, so that noise does not decide between turns.
     """
     extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
@@ -196,7 +196,7 @@ class Reduced:
 
 
 Source = Callable[[int, int, bool], Array]
-"""Rows `[1, columns.., y]` with the normal equations of the samples from start to stop of one course.
+"""Rows `[1, columns.., y]` with the same normal equations as the samples from start to stop of one course.
 
 Called in order, beginning at sample 0; returns no rows if the samples are not compared.
 """
@@ -221,7 +221,7 @@ def reduce(
 ) -> Reduced:
     """Reduce the records; `tick` is called with the number of samples of each chunk.
 
-    `source`: returns the rows of a course, with `further` columns after those of the plays of `thresholds`.
+    `source`: returns the rows of a course, with `further` columns after those for the plays at `thresholds`.
     """
     width = len(thresholds) + further + 1
     whole = np.empty((0, width))
@@ -331,7 +331,7 @@ def _close_segment(
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
     """Write the rows of the samples whose y is a number into `out`, or none if it has no room; return their number.
 
-    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible, so if a play does not move,
+    Updates the plays' `states`. `sums`: room for seven numbers. The memory is admissible, so if a play does not move,
     plays with larger thresholds do not move either.
     """
     wanted = len(out) > 0
@@ -376,6 +376,6 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
 
 
 def segment_rows(v: Array, y: Array, thresholds: Array, states: Array, wanted: bool) -> Array:
-    """Rows `[1, plays.., y]` for the samples, none unless `wanted`; updates `states` of the plays."""
+    """Rows `[1, plays.., y]` for the samples, none unless `wanted`; updates the plays' `states`."""
     out = np.empty((len(v) + 1 if wanted else 0, len(thresholds) + 2))
     return out[: _segment_rows(v, y, thresholds, states, np.empty(7), out)]

@@ -69,7 +69,7 @@ class Settings:
         return said
 
     def _emit(self, fit: Fit) -> tuple[dict[str, Any], list[str]]:
-        """The `emit` of the file in the units of the fit, and the keys that cannot be converted to these units."""
+        """The file's `emit` in the units of the fit, and the keys that cannot be converted to these units."""
         emit, lost = dict(self.values.get("emit") or {}), []
         for path, key in MEASURED.items():
             *above, last = path.split(".")
@@ -90,7 +90,7 @@ class Settings:
         return emit, lost
 
     def _units(self, fit: Fit) -> dict[str, str]:
-        """The file's units for quantities of which the fit has none."""
+        """The file's units for quantities to which the fit gives none."""
         units = fit.parameters.units.model_dump()
         return {key: unit for key, unit in (self.units or {}).items() if unit and not units[key]}
 

@@ -68,8 +68,8 @@ def estimated(
     """The courses compared from their beginning, with a start memory for each course with an unknown history.
 
     `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
-    of that option. The start of a course stays ignored if its errors are far larger than those after it (a transient),
-    or if the drive does not go up and down again.
+    that the option takes. The start of a course stays ignored if its errors are far larger than those after it (a
+    transient), or if the drive does not go up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
@@ -101,7 +101,7 @@ def needed(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """The courses, with a start memory (`estimated`) for each course with too few comparable samples otherwise.
+    """The courses, with a start memory (`estimated`) for each that would otherwise have too few comparable samples.
 
     `least`: fraction of a course's samples that is enough; `largest`: threshold above which plays hardly move; their
     memory is ignored if waiting for it would leave too few samples to compare and no start memory is found.
@@ -149,7 +149,7 @@ def unknown(item: Course, largest: float = math.inf) -> Course:
 
 
 def _enough(item: Course, least: float, largest: float) -> Course:
-    """The course from where every play is known or, if that is too short, every play up to threshold `largest`."""
+    """The course from where every play is known or, if that is too short, from where those up to `largest` are."""
     exact = unknown(item)
     return exact if exact.used >= least * _whole(item).used else unknown(item, largest)
 
@@ -229,7 +229,7 @@ def memory_of(slopes: Array, r: Array) -> Array:
 
 
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
-    """Drive values that bring virgin plays of thresholds r (n+1,) to an admissible memory (n+1,).
+    """Drive values that bring virgin plays with thresholds r (n+1,) to an admissible memory (n+1,).
 
     As a function of the threshold, the memory left by a history has slopes of -1 and 1 only: going inwards from the
     outermost play, a part that falls with the threshold comes from a turn at `s + r`, a part that rises from a turn at
@@ -290,7 +290,7 @@ class _System:
 
     @property
     def slopes(self) -> int:
-        """Number of unknowns of the start."""
+        """Number of unknowns that describe the start."""
         return len(self.r) - 1 if self.item.history is None else 0
 
     def simple(self) -> list[Array]:
@@ -303,7 +303,7 @@ class _System:
         return [np.zeros(n), np.diff(virgin) / np.diff(self.r), *turned]
 
     def rows(self, slopes: Array, p: Array) -> Array:
-        """Rows `[plays (n+1), change with the slopes.., y]` linearised about slopes and weights, offset projected out.
+        """Rows `[plays (n+1), change with the slopes.., y]` linearised about slopes and weights, offset removed.
 
         A play that has not moved yet is a constant; once it has moved, the output does not depend on its start.
         """
@@ -335,7 +335,7 @@ class _System:
         return float(np.abs(reduction.triangle(np.column_stack(both))[-1, -1]))
 
     def change(self, held: Array) -> Array:
-        """Change of the output with each slope, for the weights `held` of the plays that have not moved."""
+        """Change in the output per unit of each slope, for the weights `held` of the plays that have not moved."""
         return np.asarray(np.cumsum(held[::-1])[::-1][1:] * np.diff(self.r))
 
     def _moved(self, states: Array) -> NDArray[np.intp]:
@@ -358,7 +358,7 @@ class _Search:
 
     @classmethod
     def of(cls, courses: Sequence[Course], r: Array, known: Array | None) -> _Search:
-        """The search for the courses, as seen by plays of thresholds r (n+1,), from their beginning."""
+        """The search for the courses, as seen by plays with thresholds r (n+1,), from their beginning."""
         return cls(tuple(_System.of(_whole(item), r) for item in courses), r, known)
 
     @property
@@ -402,7 +402,7 @@ class _Search:
         return np.concatenate(shape)
 
     def _left(self, system: _System, slopes: Array) -> float:
-        """The residual error with a memory on one course, with its best weights unless weights are known."""
+        """The residual error on one course with a memory and, unless weights are known, its best weights."""
         if self.known is not None:
             return system.left(slopes, self.known)
         alone = replace(self, systems=(system,))

@@ -39,7 +39,7 @@ class Dac:
 
     @property
     def lsb(self) -> float:
-        """Change of the drive by one code."""
+        """Change in the drive per code."""
         return (self.high - self.low) / 2.0**self.bits
 
     @property
@@ -62,7 +62,7 @@ class Dac:
         return self.low + (np.asarray(codes) + self.zero) * self.lsb
 
     def problems(self, low: float, high: float) -> Iterator[str]:
-        """All problems of this converter with drives from `low` to `high`."""
+        """All problems that this converter has with drives from `low` to `high`."""
         own = [*wrong_bits(self.bits), *wrong_range(self.low, self.high)]
         yield from own
         if own:
@@ -80,7 +80,7 @@ class Dac:
             )
 
     def sentence(self, unit: str, span: float) -> str:
-        """A sentence about its resolution, for drives over `span`; `unit`: the drive's unit after a space, or empty."""
+        """A sentence about its resolution for drives over `span`; `unit`: the drive's unit after a space, or empty."""
         how = "straight binary" if self.coding == CODINGS[0] else "two's complement"
         return (
             f"Drives are codes of a {self.bits}-bit DAC over {self.low:g} to {self.high:g}{unit}, {how}: one code is "
@@ -103,7 +103,7 @@ def wrong_range(low: float, high: float) -> Iterator[str]:
 
 def filled(codes: ArrayLike, every: int) -> Codes:
     """Codes (N,) at every tick, from codes given at every `every`-th tick: the integers nearest to the straight lines
-    between these codes."""
+    between the given codes."""
     nodes = np.asarray(codes, dtype=np.int64)
     steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
     return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])

@@ -1,4 +1,4 @@
-"""Drives and times of a plan, as integer multiples of decimal steps."""
+"""A plan's drives and times, as integer multiples of decimal steps."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Grid:
         return cls(digits, math.ceil(first), math.floor(last))
 
     def values(self, codes: Sequence[int]) -> list[float]:
-        """The drives of codes: the doubles nearest to the decimal values."""
+        """The drives for codes, which are the doubles nearest to the decimal values."""
         unit = 10 ** abs(self.digits)
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 

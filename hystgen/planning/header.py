@@ -19,7 +19,7 @@ def file(parameters: Parameters) -> str:
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """Indices of samples between which the drive is straight, from pairs of a number of steps and a step length."""
+    """Indices of samples between which the drive is straight, from pairs of step count and step length."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 
@@ -31,7 +31,7 @@ def header(
     stretches: Sequence[tuple[int, int]],
     words: str,
 ) -> str:
-    """`NAME_session.h`: the codes between which the drive is straight, and how many samples lie between them.
+    """The text of `NAME_session.h`, with the codes between which the drive is straight and the samples between them.
 
     `codes`: the codes of all samples; `stretches`: pairs of a number of steps and the samples per step; `words`:
     command line options of the plan.

@@ -46,7 +46,7 @@ MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class Drive:
-    """A record to be measured: `t` (N,) in s of the session, `v` (N,) in input units; `shows`: catalogue names.
+    """A record to be measured. `t` (N,): session time, s; `v` (N,): input units; `shows`: names of effects.
 
     `corner_time`: spacing of the drawn points in s; at one rate, samples between them are interpolated; `codes` (N,):
     the converter codes for `v`, None without a converter.
@@ -75,7 +75,7 @@ class PlannedDrives:
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence about each rate or time
     chosen by default. If a rate was given, all drives are played as one, `whole`, with codes for `dac`; `session` gives
-    the positions of the records in it, and `stretches` its numbers of steps between drawn points and ticks per step.
+    the positions of the records in it, and `stretches` the steps between its drawn points and the ticks per step.
     """
 
     parameters: Parameters
@@ -193,7 +193,7 @@ def plan(
 
     `rate`: the sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and all
     drives are parts of one session, with rests between them. `dac_bits`, `dac_range` and `dac_coding` describe the
-    converter's codes (see `Dac`); the drives are then the values that the codes produce, and exceed `max_rate` by no
+    converter's codes (see `Dac`); the drives are then the values that the codes produce, which exceed `max_rate` by no
     more than one code.
 
     Raises ParameterError, PlanError with every problem.

@@ -38,9 +38,9 @@ class PlayedRecord:
 class Session:
     """The signal played: `samples` at `rate`, Hz, containing `records`.
 
-    `history`: drives visited before the first record and at the end of each, the highest and the lowest of all drives;
-    `rest`: pause between records, s; `rise`: time of the first rise through the middle between these two, s from the
-    first sample, used to align a recording; `dac`: the fields of the converter, if there are codes.
+    `history`: drives visited before the first record and at the end of each, namely the highest and the lowest of all;
+    `rest`: pause between records, s; `rise`: time in s from the first sample to the first rise through the middle
+    between these two, used to align a recording; `dac`: the fields of the converter, if there are codes.
     """
 
     rate: float

@@ -77,7 +77,7 @@ class Waveform:
 
 
 def sine(turns: float) -> float:
-    """sin(2 pi turns), to 1e-13 and equal everywhere: the last bit of the C library's sine depends on the machine."""
+    """sin(2 pi turns) to 1e-13, equal everywhere; the last bit of the C library's sine depends on the machine."""
     x = turns - math.floor(turns + 0.5)
     if abs(x) > 0.25:
         x = math.copysign(0.5, x) - x
@@ -149,7 +149,7 @@ def _steps(drive: Waveform, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(drive: Waveform, samples: int = 1100) -> None:
-    """Frequency rises as time squared to an eighth of the sampling rate; amplitude falls to keep the rate limit."""
+    """Frequency rises as time squared to an eighth of the sampling rate; amplitude falls to keep to the rate limit."""
     first, last = 1.0 / (16.0 * drive.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
@@ -161,7 +161,7 @@ def _sweep(drive: Waveform, samples: int = 1100) -> None:
 
 
 def _multisine(drive: Waveform, period: int = 240, periods: int = 4) -> None:
-    """Odd harmonics with random phases, in whole periods."""
+    """Odd harmonics with random phases, over whole periods."""
     phases = random.Random(1)
     lines = [(line, phases.random()) for line in range(1, 24, 2)]
     one = [sum(sine(line * k / period + phase) / line for line, phase in lines) for k in range(period)]
@@ -219,7 +219,7 @@ class RecordKind:
 
 
 BEND_SHOWN_BY = {"slow": 1, "multisine": 1, "slow_minor": 2, "slow_reversals": 2}
-"""Records that show a bent front, as `Effect.shown_by`."""
+"""Records that show a bent front, in the form of `Effect.shown_by`."""
 
 
 _fast: Callable[[Tempo], int] = attrgetter("fast")

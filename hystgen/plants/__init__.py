@@ -1,4 +1,4 @@
-"""Hysteretic plants to compensate, other than Prandtl-Ishlinskii models: for examples and tests.
+"""Hysteretic plants to compensate, other than Prandtl-Ishlinskii models, for examples and tests.
 
 All of them are rate-independent, so `simulate(v)` takes only the input samples and no time: between two samples the
 input moves in a straight line, and its speed makes no difference. Every call begins at the plant's start state and

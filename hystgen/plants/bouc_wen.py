@@ -16,7 +16,7 @@ from hystgen.plants import integration
 
 @jit
 def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tuple[float, float]:
-    """The part of a move that reduces |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0: |z| after it, and the remainder of s.
+    """|z| after the part of a move that reduces |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0, and the remainder of s.
 
     n = 1 and 2 only.
     """

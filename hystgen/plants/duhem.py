@@ -20,7 +20,7 @@ class Duhem:
     """General Duhem model: `dy/dv = rising(v, y)` where the input rises and `falling(v, y)` where it falls.
 
     `rising`, `falling`: functions of two floats, in output per input unit; `start`: y at the input 0; `scale` > 0: the
-    magnitude of y to which the tolerance near zero refers. Raises ValueError, also if the integration fails.
+    magnitude of y to which the tolerance near zero refers. Raises ValueError, including if the integration fails.
     Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM Review 35, 1993.
     """
 
@@ -78,7 +78,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
                     rest = 0.0
                 elif change < math.inf:
                     rest *= math.exp(-math.log1p(change) / (exponent - 1.0))
-                else:  # where the 1 of log1p is negligible
+                else:  # where the 1 in log1p is negligible
                     rest = ((exponent - 1.0) * s) ** (1.0 / (1.0 - exponent))
             force = sign * limit * (1.0 - rest)
             last = v[k]

@@ -21,7 +21,7 @@ def langevin(x: float) -> float:
 def langevin_slope(x: float) -> float:
     if abs(x) < 0.05:
         return 1.0 / 3.0 - x * x * (1.0 / 15.0 - x * x * (2.0 / 189.0 - x * x / 675.0))
-    if abs(x) > 40.0:  # the other term is below rounding, and for larger x it would overflow
+    if abs(x) > 40.0:  # the other term is lost in rounding, and for larger x it would overflow
         return 1.0 / (x * x)
     return 1.0 / (x * x) - 1.0 / math.sinh(x) ** 2
 

@@ -28,7 +28,7 @@ class KrasnoselskiiPokrovskii:
     `r(x)` rises along a straight line from -1 at x = 0 to 1 at x = `ramp` > 0. `lower`, `upper`: p_1 <= p_2 of every
     kernel, in input units, where it reaches -1 as it falls and leaves -1 as it rises; `weights`: of any sign, in output
     units; `start` in [-1, 1]: state of all kernels before the first sample. Raises ValueError. With a narrow ramp a
-    kernel is a relay; with a ramp wider than the input's range, a play. Source: H. T. Banks, A. J. Kurdila, G. Webb,
+    kernel is a relay; with one wider than the input's range, a play. Source: H. T. Banks, A. J. Kurdila, G. Webb,
     Identification of hysteretic control influence operators representing smart actuators, Math. Probl. Eng. 3, 1997.
     """
 

@@ -112,7 +112,7 @@ class EverettTable:
 class Preisach:
     """Sum of relays that switch up at alpha and down at beta <= alpha, computed exactly from the remembered extrema.
 
-    `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, increasing
+    `everett(alpha, beta)`: change in the output when the input rises from beta to alpha, 0 for alpha = beta, increasing
     in alpha and decreasing in beta, a function of two arrays; in output units. `low`, `high`: range of the relays,
     outside which an input changes nothing; `offset`: output with all relays down, as they are before the input visits
     `history`. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M

@@ -34,7 +34,7 @@ class Effect:
 class Surroundings:
     """Inputs of an effect: fine time and steps [s], drive [input], temperature [degC], the bench.
 
-    Strengths of effects that accumulate refer to the end of the session, or of `first` if the plant went through that.
+    Strengths of effects that accumulate refer to the end of the session, or of `first` if the plant went through it.
     """
 
     t: Array
@@ -77,7 +77,7 @@ def pick(rng: np.random.Generator, *names: str) -> str:
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:
-    """Log-uniform."""
+    """A log-uniform random number."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 

@@ -69,7 +69,7 @@ def lag(effect: Effect, x: Array, around: Surroundings) -> Array:
 
 @njit(cache=True)
 def first_order(x: Array, dt: Array, tau: float) -> Array:
-    """Exact for an input that is linear between samples, settled at the start."""
+    """A first-order lag, settled at the start; exact for an input that is linear between samples."""
     out = np.empty_like(x)
     a = x[0]
     out[0] = a

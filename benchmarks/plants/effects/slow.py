@@ -30,7 +30,7 @@ def draw_creep(rng: np.random.Generator, bench: Bench) -> Effect:
 
 
 def creep(effect: Effect, h: Array, around: Surroundings) -> Array:
-    """Creep behind the hysteresis; `domain_share` of it follows only the curved part of the response, as domains do."""
+    """Creep behind the hysteresis; a share `domain_share` follows only the response's curved part, as domains do."""
     if effect.strength == 0.0:
         return h
     taus, weights = spectrum(effect)

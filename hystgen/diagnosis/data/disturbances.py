@@ -101,7 +101,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
 
 def _mains(frequency: float, width: float) -> float | str | None:
-    """The mains frequency that a line matches, or the harmonic as text; `width`: the line's uncertainty, Hz."""
+    """The mains frequency that a line matches, or the harmonic as text; `width`: uncertainty of its frequency, Hz."""
     for mains in MAINS:
         for n in MAINS_HARMONICS:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
@@ -110,9 +110,9 @@ def _mains(frequency: float, width: float) -> float | str | None:
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line, if in most records that show it each half predicts the line in the other half.
+    """The strongest line, if in most of the records that show it, each half predicts the line in the other.
 
-    The actuator produces no steady lines of its own: lines of the drive are excluded, and ringing decays.
+    The actuator produces no such lines itself, since lines of the drive are excluded and ringing decays.
     """
     line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
@@ -170,7 +170,7 @@ def _without(error: Array, phase: Array) -> tuple[Array, float]:
 
 
 MOST_SAMPLES = 20_000
-"""Approximate number of samples used to refine a pitch; with this many, only noise limits the accuracy."""
+"""Approximate number of samples used to refine a pitch, enough that only noise limits the accuracy."""
 
 FINER = 4
 """Zero-padding factor for the spectrum over position: pitches between integer fractions of the range get bins too."""
@@ -180,7 +180,7 @@ FINER = 4
 class _Motion:
     """The motion of a record at the compared samples, selected by `at`.
 
-    `places`: predicted positions; `errors`: the errors at these positions; `moves`: change of the prediction since the
+    `places`: predicted positions; `errors`: the errors at these positions; `moves`: change in the prediction since the
     previous sample, NaN during holds, which only repeat a position that the model was fitted to. Positions are
     predicted because a ripple that is large relative to its pitch is not sinusoidal over the measured position.
     """
@@ -271,7 +271,7 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
 def _ripple(
     items: Sequence[Item], errors: Sequence[Array], motions: Sequence[_Motion], pitch: float
 ) -> Removed | None:
-    """The ripple, if most passes (up or down over several pitches) show the ripple that all others predict.
+    """The ripple, if most passes (up or down over several pitches) show the ripple that all the others predict.
 
     An error due to a lag or a hysteresis loop, by contrast, differs between upward and downward passes.
     """
@@ -328,7 +328,7 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | R
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
-    """Like `lines`, but only steady lines and ripples that dominate the errors; the actuator does not cause these."""
+    """Like `lines`, but only for steady lines and ripples that dominate the errors, not caused by the actuator."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 
@@ -352,13 +352,13 @@ def _strongest_first(
 Fitted = TypeVar("Fitted", bound=FittedLike)
 
 ROUNDS = 3
-"""Maximum number of removal rounds: a model fitted with a ripple predicts wrong positions until the ripple is
-removed."""
+"""Maximum number of removal rounds; more than one is needed because a model fitted with a ripple predicts wrong
+positions until the ripple is removed."""
 
 
 @dataclass(frozen=True)
 class Cleaned:
-    """Records as measured, the same records without their lines, and the lines."""
+    """Records as measured, the same records without their lines, and the lines themselves."""
 
     measured: Prepared
     clean: Prepared
@@ -391,7 +391,7 @@ class Cleaned:
 
 
 def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Cleaned:
-    """The records without the lines in a model's errors; the model is refitted to them in every round."""
+    """The records without the lines in a model's errors; the model is refitted to these records in every round."""
     for _ in range(ROUNDS):
         seen = found.seen_by(fitted)
         if not seen.lines:
@@ -401,7 +401,7 @@ def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted
 
 
 def _moving(ready: Prepared) -> Prepared:
-    """The records without their holds: there a ripple is a constant offset, which the fit would absorb unnoticed."""
+    """The records without their holds, where a ripple is a constant offset that the fit would absorb unnoticed."""
 
     def without_holds(item: Item) -> Item:
         y = item.y.copy()
@@ -469,7 +469,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether some moves far exceed nearby ones, not counting adjacent ones, over which a filter can spread a jump."""
+    """Whether each move far exceeds nearby ones, not counting adjacent ones, over which a filter can spread a jump."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

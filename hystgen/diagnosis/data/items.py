@@ -1,6 +1,6 @@
 """Records prepared for comparison with a model, with all usable samples or with fewer.
 
-Inside a stretch where drive and plays are linear, no samples are needed: plays depend only on turning points, and
+Within a stretch where drive and plays are linear, no samples are needed, since plays depend only on turning points and
 filters are exact for linear inputs.
 """
 
@@ -28,14 +28,14 @@ MOVEMENTS = 5, 2**25
 """Maximum number of play movements cached for a record, and their total size in bytes."""
 
 DIFFERENCES = 12, 2**25
-"""The same limits for errors before the free offsets are fitted: each hypothesis of a round is compared with others."""
+"""The same limits for errors before free offsets are fitted; each hypothesis of a round is compared with others."""
 
 COMPARISONS = 40, 2**23
 """The same limits for errors after the free offsets and start states are fitted."""
 
 
 ROUNDED = float(np.finfo(np.float64).eps) ** 0.5
-"""Smallest relative change of a value for a difference quotient: half of the digits remain for the slope."""
+"""Smallest relative change in a value for a difference quotient, so that the slope keeps half of the digits."""
 
 
 class Recent:
@@ -67,7 +67,7 @@ class Recent:
 
 @dataclass(frozen=True)
 class Item:
-    """A record to compare: `y` is NaN at samples left out; `history`: drive values before the record, None if unknown.
+    """A record to compare. `y`: NaN at samples left out; `history`: drive values before the record, None if unknown.
 
     `timed`: whether the record's times are known. `turns`: drive values that bring virgin plays to the start memory
     found without a history, if any. `session`: all records on one time axis, if they form a session; `part`: this
@@ -116,9 +116,9 @@ class Item:
         return Course(self.name, self.run.v, self.y, self.history, first, last, first, start=start)
 
     def step(self, h: Array) -> float:
-        """Step in a predicted output (N,) for the slope of a map, output units.
+        """Step with which to find a map's slope by differences around a predicted output (N,), output units.
 
-        The usual fraction of the measured range, but large enough to survive the rounding of the output: the range is
+        The usual fraction of the measured range, but large enough to survive the output's rounding, since the range is
         zero if the drive rests or only one sample is compared.
         """
         largest = max(float(np.max(np.abs(x), initial=0.0)) for x in (h, self.y[self.known]))
@@ -154,7 +154,7 @@ def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
 
 
 class FittedLike(Protocol):
-    """The part of a fitted model that checks of the records need."""
+    """What checks of the records need to know about a fitted model."""
 
     @property
     def reach(self) -> float:
@@ -181,7 +181,7 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
         return np.ones(number, dtype=bool)
     residual, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (residual, item.y - residual))
     as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
-    bends = [  # signal, limit of its deviation from a straight line, and whether that limit is an rms or a maximum
+    bends = [  # signal, limit on its deviation from a straight line, and whether that limit is an rms or a maximum
         (predicted, acceptance.THIN_STRAIGHT * noise, False),
         (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
         (residual, acceptance.THIN_RESIDUAL * noise, True),
@@ -216,14 +216,14 @@ def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
 
 
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
-    """Groups of records thinned to the needed samples and evenly spaced ones, of which each group has at most `most`.
+    """Groups of records, each thinned to at most `most` samples: the needed ones and evenly spaced ones.
 
     `masks`: the needed samples of each record. If all groups are small enough, they are returned unchanged.
     """
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:
         return [list(group) for group in groups]
-    kept: dict[int, Mask] = {}  # by run, since two items may be parts of the same record
+    kept: dict[int, Mask] = {}  # keyed by run, since two items may be parts of the same record
     for group, step, needs in zip(groups, every, masks, strict=True):
         for item, mask in zip(group, needs, strict=True):
             keep = mask.copy()

@@ -47,7 +47,7 @@ Predict = Callable[[Record], Array]
 
 @dataclass(frozen=True)
 class Against:
-    """A record's output as `factor * prediction + offset`, with the correlation of the two.
+    """A record's output as `factor * prediction + offset`, with the correlation between the two.
 
     `sense`: ratio of the measured loop's area to the predicted one's, negative if the output leads, 0 if it is not
     significant.
@@ -203,7 +203,7 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
     return best[0] if best[1] > acceptance.FOREIGN_CORRELATION else None
 
 
-# Whether the records start with the memory that the given history leaves -------------------------------------
+# Whether the records start with the memory left by the given history -----------------------------------------
 
 
 def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | None:
@@ -255,7 +255,7 @@ def _off(first: Sequence[Array], later: Sequence[Array]) -> OtherHistory | None:
 class Prepared:
     """Fitted and held-out records, with notes on every change to them.
 
-    `repaired`: faults that were left out or bridged; `drive`: range of the fitted drives; `thresholds`: of the plays.
+    `repaired`: faults left out or bridged; `drive`: range of the fitted drives; `thresholds`: those of the plays.
     """
 
     to_fit: list[Item]
@@ -273,7 +273,7 @@ def prepare(
     rest: float,
     skip: float = 0.0,
 ) -> Prepared:
-    """Items for the fits; without a usable held-out record, every third record is held out, or the end of each.
+    """Items for the fits; without a usable held-out record, every third record or the end of each is held out.
 
     `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, for example if too
     few samples can be compared.
@@ -349,12 +349,12 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with start memories if too few samples could be compared without, and notes on their loop
-    directions.
+    """The courses, with start memories if too few samples could be compared without them, and notes on the directions
+    of their loops.
 
     Otherwise no start memory is estimated, since it could absorb the first seconds of an effect. The need is judged for
     each fitted record, since the fit needs all of them, but for all held-out records together: a memory found before
-    the effects are known may be wrong by the whole contribution of an effect, an error that no effect then removes.
+    the effects are known may be wrong by an effect's whole contribution, and no effect can then remove that error.
     """
     low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
     largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist but would hardly move
@@ -367,7 +367,7 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
 def _reach(courses: Sequence[Course]) -> float:
     """The largest threshold for the fits: that of the widest play that moves visibly, if only at the ends of the range.
 
-    With a fit's usual largest threshold, the motion of wider plays would remain and look like an effect.
+    With a fit's usual largest threshold, the motion of wider plays would stay in the errors and look like an effect.
     """
     return pi.largest(courses, pi.LEAST_VISIBLE)
 
@@ -404,7 +404,7 @@ def _item(course: Course, record: Record, rest: float) -> Item:
 
 def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
     """First sample to compare; if a step of the drive wipes the start memory, the first at which the output is within
-    `AS_FAR` of where it settles, since behind a lag or a slew limit the plays are wiped only then."""
+    `AS_FAR` of its settled value, since plays behind a lag or a slew limit are wiped only then."""
     first = course.first
     if course.start is not None or course.visited is not None or not edges[first : first + 1].any():
         return first
@@ -419,7 +419,7 @@ def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples left out only as isolated samples of the output."""
+    """Samples left out only because they are isolated outliers of the output."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
@@ -447,7 +447,7 @@ JUDGE = "judge by"
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether this fraction of some course is enough to compare, with a start memory if one can be found."""
+    """Whether this fraction of at least one course is enough to compare, with a start memory if one can be found."""
     return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
 
 
@@ -510,7 +510,7 @@ def set_aside(records: Sequence[Record]) -> list[int]:
 
 
 def with_ends(ready: Prepared) -> Prepared | None:
-    """The records with the end of each fitted one held out too; None if the ends already are, or are too short."""
+    """The records with the end of each fitted one held out too; None if they already are, or the ends are too short."""
     ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
     longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
     if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
@@ -583,7 +583,7 @@ def merged(findings: Sequence[Kind]) -> list[Kind]:
 
 
 def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[Finding]:
-    """The repairs, with samples listed as held instead of saturated if another record goes beyond their level."""
+    """The repairs, with samples listed as held rather than saturated if another record goes beyond their level."""
     highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
     span = highest - lowest
     found: list[Finding] = []

@@ -40,7 +40,7 @@ class NoiseFloor:
 
 
 def noise_floor(items: Sequence[Item]) -> NoiseFloor:
-    """The noise of the measured outputs of several records."""
+    """The noise in the measured outputs of several records."""
     holds = _pooled([part for item in items for part in _holds(item)], acceptance.QUIET_HOLDS)
     differences = _pooled([part for item in items for part in _differences(item)], 0.5)
     periods = _pooled([part for item in items for part in _periods(item)], 0.5)
@@ -62,7 +62,7 @@ def converter_step(y: Array) -> float:
 
 
 def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None:
-    """Square root of a quantile of the variances, which ignores outliers; longer parts count more."""
+    """Square root of a quantile of the variances, which is robust to outliers; longer parts count more."""
     sample = acceptance.HOLD_SAMPLES
     variances = np.array([v for v, n in parts for _ in range(max(1, min(n // sample, acceptance.HOLD_WEIGHT)))])
     return float(np.sqrt(np.quantile(variances, quantile))) if len(variances) else None
@@ -143,9 +143,9 @@ def _sampled(y: Array) -> Array:
 
 
 UNMEASURED = 1e-9
-"""[fraction of the range of the output] Smaller changes count as rounding. Interpolated samples are detected in files
-with 12 digits and offsets up to ten times the range, but not in files with 9; second differences of a noise-free sine
-are smaller only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
+"""[fraction of the output range] Smaller changes count as rounding. Interpolated samples are detected in files with 12
+digits and offsets up to ten times the range, but not in files with 9 digits; a noise-free sine has smaller second
+differences only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
 
 
 def _periods(item: Item) -> list[tuple[float, int]]:
@@ -185,7 +185,7 @@ def unresolved_edges(v: Array) -> NDArray[np.bool_]:
     """Samples at which the drive jumps from one level to the next; its course between these samples is unknown.
 
     A jump within one sample, or two if the converter averages, may begin anywhere in that time, as a step or a ramp.
-    The errors during the jump and at the next sample depend on the assumed edge, where even a small lag matters.
+    The errors during the jump and at the next sample depend on the edge assumed, and there even a small lag matters.
     """
     swing = float(np.ptp(v))
     step = np.abs(np.diff(v))
@@ -226,7 +226,7 @@ def one_speed(items: Sequence[Item]) -> bool:
 
 
 def _moves(v: Array) -> tuple[Places, Places]:
-    """Samples after which the drive moves, and samples at which it turns, with its noise removed by a play."""
+    """Samples after which the drive moves, and samples at which it turns, once a play has removed its noise."""
     z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
     steps = np.diff(z)
     moved = np.flatnonzero(steps)
@@ -234,11 +234,11 @@ def _moves(v: Array) -> tuple[Places, Places]:
 
 
 def _between_ends(turns: Places) -> Places:
-    """All turns but the first: the move to the first turn may begin anywhere."""
+    """All turns but the first, since the move to that one may begin anywhere."""
     return turns[1:] if len(turns) > 1 else turns
 
 
-# Spectra of errors: narrow peaks that do not come from the drive, ringing that fades, the period of a drive --
+# Spectra of errors: narrow peaks not caused by the drive, ringing that fades, the period of a drive ----------
 
 
 BESIDE = 2
@@ -270,7 +270,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
     for k, beside, share in narrow:
-        # a line of the drive itself, perhaps a weak one among many harmonics
+        # a line of the drive itself, perhaps a weak one amid many harmonics
         own = float(np.sum(drive[beside])) >= acceptance.DRIVE_LINE_SHARE * driven
         if own and drive[k] > acceptance.PEAK_HEIGHT * _around(drive, k, acceptance.SURROUNDINGS):
             continue

@@ -96,7 +96,7 @@ def _contender(ranked: Ranked, unit: str | None) -> Contender:
 
 
 def reason(refused: Refusal, unit: str | None) -> str:
-    """The reason why an effect is not named, as text."""
+    """The reason an effect is not named, as text."""
     return REFUSALS[refused.why].format(value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else "")
 
 
@@ -162,7 +162,7 @@ def _unexplained(
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
-    # like noise, a ripple hides jumps if the position is not predicted well enough to remove it
+    # if the position is not predicted well enough to remove a ripple, the ripple hides jumps as noise does
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
@@ -206,7 +206,7 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float, noise: flo
 
 
 def _twice(times: Sequence[float]) -> bool:
-    """Whether two time constants are practically equal."""
+    """Whether two of the time constants are practically equal."""
     ordered = sorted(times)
     return any(b <= (1.0 + acceptance.BETTER) * a for a, b in itertools.pairwise(ordered))
 
@@ -224,14 +224,14 @@ def _evidence(each: Found, refitted: float, noise: float) -> str:
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """An effect's keys without the name, or the front's stage; `later`: number of effects of that name after it."""
+    """An effect's keys without the name, or the front's stage; `later`: number of effects with that name after it."""
     k = fits.place(fitted, name, later)
     if k is None:
         return fits.stage(fitted, fitted.shape)
     return fits.entry(fitted.structure.effects(fitted.shape)[k])
 
 
-# The remaining error: the variables that it depends on -------------------------------------------------------
+# The remaining error: the variables on which it depends ------------------------------------------------------
 
 
 DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
@@ -250,7 +250,7 @@ Set by: benchmarks/chosen_numbers.py lengths."""
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable that an error may depend on: its name, and its values over a record."""
+    """A variable on which an error may depend, with its name and its values over a record."""
 
     name: str
     of: Callable[[Item], Array]
@@ -269,7 +269,7 @@ def displacement(item: Item) -> Array:
 
 
 def travel(item: Item) -> Array:
-    """Distance that the drive has travelled since the session began, as far as recorded."""
+    """Distance that the drive has travelled since the session began, to the extent that it was recorded."""
     whole = item.session or item.run
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(whole.v)))])[item.part]
 
@@ -454,7 +454,7 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 
 
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Even fraction of the mean error over drive and direction: the part unchanged when both are reversed.
+    """Even fraction of the mean error over drive and direction: the part that is unchanged when both are reversed.
 
     None if that mean is small compared with the error.
     """

@@ -23,7 +23,7 @@ class Finding(ABC):
     optional: ClassVar[frozenset[str]] = frozenset()
 
     def entry(self) -> dict[str, object]:
-        """The entry as in `diagnosis.json`."""
+        """The entry as it appears in `diagnosis.json`."""
         entry: dict[str, object] = {"kind": self.kind}
         for each in fields(self):
             value = getattr(self, each.name)
@@ -33,7 +33,7 @@ class Finding(ABC):
 
     @abstractmethod
     def sentence(self, unit: str | None) -> str:
-        """The entry as a sentence without a full stop; `unit`: of the displacement."""
+        """The entry as a sentence without a full stop; `unit`: the unit of the displacement."""
 
     def advice(self) -> list[str]:
         """Experiments that would reveal more about the finding, one sentence each."""
@@ -42,7 +42,7 @@ class Finding(ABC):
 
 @dataclass(frozen=True)
 class Fault(Finding):
-    """A fault in part of a recording, left out of the comparison or put right; the rest of the record is sound.
+    """A fault in part of a recording, left out of the comparison or corrected; the rest of the record is sound.
 
     `noun`: the noun counted in its sentence; `qualifier`: the words after the noun.
     """
@@ -87,7 +87,7 @@ class ExchangedRecords(Finding):
 
 @dataclass(frozen=True)
 class Scale(Finding):
-    """An output `factor` times the expected one, of one record or of `all`."""
+    """An output that is `factor` times the expected one, in one record or in `all`."""
 
     kind = "scale"
     record: str
@@ -107,7 +107,7 @@ class Scale(Finding):
 
 @dataclass(frozen=True)
 class OtherHistory(Fault):
-    """A given history that the starts of the records contradict: rms errors at the starts and elsewhere."""
+    """A given history that the starts of the records contradict, with the rms errors at the starts and elsewhere."""
 
     kind, noun, qualifier = "history", "history", " that the starts contradict"
     record: str
@@ -318,7 +318,7 @@ class WildInverse(Finding):
 
     `moves`: rms change that the inverse with the effects causes in the plain model's output, over recorded outputs;
     `other`: the same with the two models exchanged; `gain`: held-out rms that the effects explain; `wilder`: second
-    differences of its drive, divided by those of the plain inverse's drive.
+    differences of the drive with the effects, divided by those of the plain inverse's drive.
     """
 
     kind = "wild_inverse"
@@ -392,7 +392,7 @@ class Structured(Finding):
 
     def advice(self) -> list[str]:
         advice = []
-        if self.held_out_alone:  # never fitted, so an effect that shows only in these cannot be found
+        if self.held_out_alone:  # these are never fitted, so an effect that shows only in them cannot be found
             alone = several(self.held_out_alone)
             advice.append(f"fit {alone} too and hold out others: the remaining error shows only in held-out records")
         if self.rate_free is None:

@@ -114,9 +114,9 @@ WRITTEN = {
 class NamedEffect:
     """An effect that was found: `parameters` as in a parameter file, with 95 % `intervals`.
 
-    `share_of_gap`: the held-out error that the effect removes, as a fraction of the refitted model's; errors in output
-    units; `at_an_end`: whether a parameter is at an end of its range or two parts of the effect coincide, so that its
-    shape is not certain; `ends`: the parameters at an end.
+    `share_of_gap`: the held-out error that the effect removes, as a fraction of the refitted model's error; errors in
+    output units; `at_an_end`: whether a parameter is at an end of its range or two parts of the effect coincide, so
+    that its shape is not certain; `ends`: the parameters at an end.
     """
 
     name: str
@@ -283,7 +283,7 @@ class Diagnosis:
         return [each for each in self.result.unexplained if isinstance(each, NotAPlaySum)]
 
     def _limits(self) -> list[str]:
-        """Warnings that precede any effect name: how few samples were compared, how much error remains."""
+        """Warnings that precede any effect name, about how few samples were compared or how much error remains."""
         result = self.result
         compared, recorded = result.compared
         said = []
@@ -333,7 +333,7 @@ class Diagnosis:
         return "Something is missing, and no effect is named"
 
     def _nearest(self) -> str:
-        """The candidate with the smallest error, and why it is not named; empty if none removes anything."""
+        """The candidate with the smallest error, and why it is not named; empty if no candidate removes any error."""
         closest = self._closest()
         if closest is None or self._of_another_kind():
             return ""
@@ -369,7 +369,7 @@ class Diagnosis:
         return kinds.times_noise(error / self.result.noise_floor)
 
     def not_emitted(self) -> str:
-        """Why the model with the effects cannot be emitted yet; empty if it can."""
+        """Why the model with the effects cannot be emitted yet; empty if it can be."""
         from hystgen.basics.problems import EffectsError, NotInvertibleError
         from hystgen.emission.calls import emit_options
         from hystgen.model import Model

@@ -1,6 +1,6 @@
 """Every number by which a diagnosis decides, with its unit, its reason, and the run that set it.
 
-The text below a number begins with its unit, in brackets, and says what happens on either side of the number. Each text
+The text below a number begins with its unit in brackets and says what happens on either side of the number. Each text
 ends with
 
 - `Set by`: the run that determined the number;
@@ -33,8 +33,8 @@ estimated from only part of the samples, and may miss slow noise. Changed by: bl
 
 FAR_ABOVE_NOISE = 2.0
 """[times the noise floor] An error above this is not noise, whether or not it depends on a known variable; coloured
-noise stays below it. Records of only one loop support no name if more than this remains, since the residual is as large
-for the right name with a wrong shape as for a wrong name. Changed by: blind none, blind poor."""
+noise stays below it. Records of only one loop support no name if more than this remains, since the right name with a
+wrong shape leaves as large a residual as a wrong name does. Changed by: blind none, blind poor."""
 
 STRUCTURE_SHARE = 0.15
 """[fraction of the error's variance] An error is structured if one variable explains more than this fraction of it on
@@ -67,7 +67,7 @@ def above_noise(removed: float) -> float:
 
 NAME_SHARE = 0.07
 """[fraction of the refitted gap, rms] An effect is named if it removes at least this from held-out or fitted records.
-After the right effect with a wrong shape, a wrong one removes up to 0.05. Set by: tune single (seeds not recorded)."""
+After the right effect in a wrong shape, a wrong effect removes up to 0.05. Set by: tune single (seeds not recorded)."""
 
 NEARLY_ALL = 0.25
 """[fraction of the error before it] An effect is also named if at most this fraction remains: next to a far larger
@@ -88,7 +88,7 @@ NEEDLESS = 0.3
 `FIRST_REMOVES`, so that chance does not drop an accepted effect. Changed by: blind pair."""
 
 P_SURE = 1e-3
-"""[probability] The gain from an effect must have at most this p-value. Tens of shapes are tried per round, so this
+"""[probability] The gain from an effect must have at most this p-value. Dozens of shapes are tried per round, so this
 criterion alone would still pass a few per cent of the cases without an effect. Changed by: blind none."""
 
 P_REPEATED = 0.05
@@ -109,8 +109,8 @@ by: acceptance::blocks_are_longer_than_errors_remember."""
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
 or the held-out records must remove at least this from the others; an error that only one group shows may belong to
-another effect. With 0.5 one of ten pairs loses its second name; with 0.25 or 0 none does, and 0 gives no false name in
-24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
+another effect. With 0.5, one of ten pairs loses its second name; with 0.25 or 0, none does, and 0 gives no false name
+in 24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
 acceptance::an_effect_has_to_show_in_both."""
 
 ALIKE = 0.25
@@ -156,13 +156,13 @@ single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::
 MUCH_LEFT = 3.0
 """[times the noise floor] If the error with the named effects is above this, the verdict begins with that error; if, in
 addition, a parameter is at an end of its range and more than `END_LEAVES` remains, none is named. In 457 blind cases
-this happened for two disturbances by room temperature and for one pair. Set by (the latter): second_plants foreign
+this happened for two disturbances due to room temperature and for one pair. Set by (the latter): second_plants foreign
 11001, 11006, pair 8012, blind first 97000. Changed by: blind single, acceptance::what_a_verdict_says_first."""
 
 END_LEAVES = 0.105
 """[fraction of the gap above the noise, rms] If more than `MUCH_LEFT` remains and a parameter of an effect is at an end
 of its range, names stand only if at most this fraction of the held-out and of the fitted error remains with them: nine
-tenths are then explained, to the whole per cent that the verdict states. A multiple of the noise alone is no criterion
+tenths are then explained, rounded to a whole per cent as in the verdict. A multiple of the noise alone is no criterion
 for records with little noise. False names for room temperature acting on the gain left 0.62 and more. Set by:
 second_plants foreign 300:308, 11000:11020. Changed by:
 selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
@@ -205,8 +205,8 @@ by: acceptance::held_out_records_that_are_alone."""
 # How far a search goes ---------------------------------------------------------------------------------------
 
 SCREENED = 6_000
-"""[samples] Number compared, fitted and held out, while all shapes are screened. Changed by: run time and names of
-blind."""
+"""[samples] Number compared in each group, fitted or held out, while all shapes are screened. Changed by: run time and
+names of blind."""
 
 SEARCHED = 12_000
 """[samples] Number used in later searches and in regressions on many variables. Changed by: run time and names of
@@ -318,7 +318,7 @@ ODD_FRONT = 2.0
 """[times] A front counts as saturation if its odd bend has more than this many times the power of its even bend.
 Changed by: acceptance::what_a_front_is_called."""
 
-# Which records are fitted and held out -----------------------------------------------------------------------
+# Which records are fitted, and which are held out ------------------------------------------------------------
 
 COMPARED_SAMPLES = 20
 """[samples] A record can be fitted or held out only if more than this are compared: `BLOCKS` of one sample.
@@ -338,7 +338,7 @@ acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction over it deviates from a straight line by at most this,
-and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
+and the drive by no more than it takes to move the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, a tenth as large because the plays remember it. Changed by:
@@ -359,8 +359,8 @@ output by no more than some tens of times the noise, so its sample has little we
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
 """[samples], [samples] The longest jump that is not resolved, from one sample to the next or with an averaged sample
 between, and the minimum number of samples for which the drive rests before and after it. With such samples, the
-residual with a lag, a delay or a rate dependence was 2 to 8 times the noise; without, 1.0 to 1.1. Set by: second_plants
-single 0:13, pair 0:6."""
+residual with a lag, a delay or a rate dependence was 2 to 8 times the noise; without them, 1.0 to 1.1. Set by:
+second_plants single 0:13, pair 0:6."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 
@@ -405,14 +405,14 @@ HELD_SHARE = 0.55
 is nonzero: if every other sample was held, half of them are. Changed by: acceptance::samples_between."""
 
 LEAST_NOISE = 1e-5
-"""[fraction of the output range] Every record is assumed to have at least this noise: 17 bits, more than sensors of a
-stage resolve in a single sample. Otherwise, records of a simulation would have a noise floor of 0, and any error would
-be far above the noise. Changed by: acceptance::records_without_noise."""
+"""[fraction of the output range] Every record is assumed to have at least this noise: 17 bits, more than a stage's
+sensor resolves in a single sample. Otherwise, simulated records would have a noise floor of 0, and any error would be
+far above the noise. Changed by: acceptance::records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
 SCALE_OF_ALL = 3.0
-"""[factor] If the outputs of all records differ from the prediction by this factor, they are in other units, or of
+"""[factor] If the outputs of all records differ from the prediction by this factor, they are in other units or from
 another actuator. Changed by: blind foreign, acceptance::other_units_of_all."""
 
 SCALE_OF_ONE = 1.7
@@ -581,15 +581,15 @@ acceptance::a_drive_that_mostly_rests."""
 
 SLIP_RESOLVED = 7.0
 """[times the noise] Stretches over which the prediction moves by this are examined: noise alone then makes the output
-stand still in one of a hundred. Derived."""
+stand still in one stretch in a hundred. Derived."""
 
 SLIP_STRETCH = 0.5, 3.0
 """[times `SLIP_RESOLVED`] Smallest and largest motion of a stretch that counts. Changed by:
 acceptance::how_much_stands."""
 
 SLIP_OFF = 0.6
-"""[fraction of the predicted motion] The output stands still if it moves less than predicted by at least this, and
-leaps if it moves more by this. Changed by: acceptance::how_much_stands."""
+"""[fraction of the predicted motion] The output stands still if its motion falls short of the prediction by at least
+this, and leaps if its motion exceeds the prediction by at least this. Changed by: acceptance::how_much_stands."""
 
 SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
 """[fraction of the stretches] With stick-slip, the output stands still in at least the first fraction and leaps in at
@@ -625,14 +625,14 @@ LOOP_SPEEDS = 1.5
 """[ratio of times] Loops are at one speed if their times differ by at most this factor. Changed by: blind poor."""
 
 LOOP_STANDS = 0.3
-"""[fraction of the time between turns] A drive that rests for longer makes a hold, not a loop. Changed by:
+"""[fraction of the time between turns] A drive that rests for longer is holding, not following a loop. Changed by:
 acceptance::a_loop_that_stands_is_none."""
 
 # How the remaining error is described ------------------------------------------------------------------------
 
 MAIN_SHARE = 0.5
-"""[fraction of the error's variance] The verdict is about a disturbance if it has at least this fraction: it is then
-most of the error. Derived."""
+"""[fraction of the error's variance] The verdict is about a disturbance if it has at least this fraction: it then makes
+up most of the error. Derived."""
 
 STRETCH_ABOVE_NOISE = 1.5
 """[times the noise floor] A stretch with a larger error is listed. A stretch has a 24th of the samples of a record, and
@@ -651,7 +651,7 @@ VARIABLE_SHARE = 0.1
 acceptance::a_variable_that_matters."""
 
 VARIABLE_BINS = 24
-"""[bins] Number that describes a function of one variable. Changed by: acceptance::folds."""
+"""[bins] Number used to describe a function of one variable. Changed by: acceptance::folds."""
 
 FOLD_BLOCKS = 16
 """[blocks] Samples alternate between fit and test in this many blocks, which are longer than errors are correlated.
@@ -669,8 +669,8 @@ RATE_FREE_SHARE = 0.75
 explain together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
-"""[fraction of the error's variance] An error is repeatable if this fraction recurs with the drive: most of it.
-Derived."""
+"""[fraction of the error's variance] An error is repeatable if this fraction recurs with the drive: that is, most of
+it. Derived."""
 
 PARITY_BINS, PARITY_SAMPLES = 20, 10
 """[bins], [samples] The even fraction is taken over this many bins of the drive's range, each of which has more than
@@ -683,11 +683,11 @@ fraction: half of `VARIABLE_SHARE`. Derived."""
 # Whether an inverse does more than records support -------------------------------------------------------------
 
 WILDER = 2.0
-"""[times] An inverse counts as calm if the second differences of its drive are up to this times those of the plain
-inverse's drive: hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
+"""[times] An inverse is calm if its drive's second differences are at most this many times those of the plain inverse's
+drive: hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
-"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, as a multiple of the
-held-out rms that the effects explain or, if larger, of the noise. The multiple was 0.85 to 0.97 for creep, a lag and
-relaxing plays at three speeds, with noise at 0.1 % of the output. Changed by:
+"""[times the gain] Largest change that an inverse with effects may make to the plain model's output, as a multiple of
+the held-out rms that the effects explain or, if larger, of the noise. The multiple was 0.85 to 0.97 for creep, a lag
+and relaxing plays at three speeds, with noise at 0.1 % of the output. Changed by:
 acceptance::an_output_that_moves_further."""

@@ -1,7 +1,7 @@
 """Fits of hypotheses to records: weights and all other parameters together, on the free-run error of whole records.
 
 The output is linear in the weights unless an output map bends it, so each step solves for the weights and for the
-change of all other parameters at once (`identification.joint`). The linear system at the fit gives their intervals.
+changes in all other parameters at once (`identification.joint`). The linear system at the fit gives their intervals.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ POLISHED = 1e-5
 matters."""
 
 COARSE = 1e-3
-"""[fraction of the error] The same limit for a search that only ranks shapes or shows whether to go on: far below
+"""[fraction of the error] The same limit for a search that only ranks shapes or shows whether to continue: far below
 `BETTER`. For any value from 1e-4 to 1e-2, eight cases of `benchmarks.second_plants` (seeds 29000 on) yield the same
 effect names, and errors within 0.5 %."""
 
@@ -126,7 +126,7 @@ class _Block:
     def _begun(self, other: Actuator) -> Array:
         """The response to the start state with other parameters; a factor at its limit follows the limit."""
         free = other.nuisances(self._item, self._offset)
-        if len(free) != self._free:  # another spectrum may have another number of states
+        if len(free) != self._free:  # a different spectrum may have a different number of states
             return self._begun(self._here)
         held, factors = self.held, self._factors.copy()
         factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
@@ -178,8 +178,8 @@ def _stacked(triangles: Sequence[Array]) -> Array:
 def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
     """The system of all records and its best weights, with the free components of each record within their limits.
 
-    A component found beyond a limit gets a slack from it, solved for with the weights (nnls), until none is beyond its
-    limit. The iteration terminates, since a component keeps its slack until it has changed sides `CROSSINGS` times.
+    A component found beyond a limit is given a slack from it, solved for with the weights (nnls), until none is beyond
+    its limit. The iteration terminates, since a component keeps its slack until it has changed sides `CROSSINGS` times.
     """
     whole = reduction.triangle(*(block.system() for block in blocks))
     solution = pi.non_negative(whole, np.arange(plays))
@@ -226,7 +226,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
 
     whole, best = _solved(blocks, n1)
-    if not np.isfinite(whole).all():  # the parameters are far from reasonable
+    if not np.isfinite(whole).all():  # the parameters are far from reasonable values
         return LocalFit(shape, p, math.inf, p, samples, derived)
     rms = root_mean_square(pi.residual(whole, np.arange(n1), best), samples)
     return LocalFit(shape, p, rms, best, samples, derived)
@@ -367,9 +367,9 @@ def _turns(fitted: Fitted, item: Item) -> Turns | None:
 
 
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:
-    """A hypothesis and its weights, p_0 raised to a fraction `floor` of the sum of weights if the records allow it.
+    """A hypothesis and its weights, with p_0 raised to `floor` times the sum of the weights if the records allow it.
 
-    As in `identify` (`pi.fit_weights`); all other parameters stay.
+    As in `identify` (`pi.fit_weights`); all other parameters are unchanged.
     """
     p, here = fitted.weights, fitted.actuator
     kept = pi.Weights(p, fitted.rms)
@@ -389,7 +389,7 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
 
 
 DRAWS = 400
-"""Random shapes per interval; its ends then scatter by 0.13 standard deviations."""
+"""Random shapes per interval; the interval's ends then scatter by 0.13 standard deviations."""
 
 HALVINGS = 20
 """Bisections between the fitted shape and an inadmissible one, down to a millionth of an interval's width."""
@@ -408,13 +408,13 @@ class Sure:
     parts: tuple[dict[str, object], ...]
 
     def of(self, fitted: Fitted, name: str, later: int) -> dict[str, object]:
-        """The intervals of an effect; `later`: number of effects of its name found after it."""
+        """The intervals of an effect; `later`: number of effects with its name found after it."""
         k = place(fitted, name, later)
         return self.front if k is None else self.parts[k]
 
 
 def place(fitted: Fitted, name: str, later: int) -> int | None:
-    """The part of an effect, None for a front; `later`: number of effects of its name found after it."""
+    """The part of an effect, None for a front; `later`: number of effects with its name found after it."""
     parts = [k for k, part in enumerate(fitted.structure.parts) if part.name == name]
     return parts[-1 - later] if later < len(parts) else None
 

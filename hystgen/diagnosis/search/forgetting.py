@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 NAME = "forgetting"
 
 BALANCE = 0.9
-"""Balance from which a search starts: between Dahl's element, 1, and one that unloads in a straight line, 0.5."""
+"""Balance from which a search starts, between 1 (Dahl's element) and 0.5 (one that unloads in a straight line)."""
 
 WEIGHT = 5.0
 """[mean slopes of the records] Largest magnitude of the weight: friction of five times the stage's stiffness has no
@@ -45,13 +45,13 @@ LOOP = 0.1
 
 WITHIN = 0.01, 1.0
 """[fractions of the drive range] Smallest and largest distance over which the element forgets: below, it acts like
-plays of the smallest thresholds; above, like a straight line and a memory of the start."""
+plays with the smallest thresholds; above, like a straight line and a memory of the start."""
 
 STARTS = 5
 """[widths] Number of widths from which a search starts, each about three times the previous one."""
 
 STEPS = 12
-"""[steps] Maximum in the search from the best width: six usually settle three parameters and the weights."""
+"""[steps] Maximum number in the search from the best width; six usually settle three parameters and the weights."""
 
 
 class Forgetting(Effect):
@@ -81,8 +81,8 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     """The element, if the records support it in addition to the effects found or instead of them; else None.
 
     The element first replaces all effects of the `outcome`, then only those that depend on time; then it is tried in
-    addition to all. Effects that explain more than the element are kept. If the difference may be chance, the effects
-    are kept if the drive covers equal distances in different times, since effects of time and of travel then differ.
+    addition to all. Effects that explain more than the element are kept. Where the difference may be chance, they are
+    kept if the drive covers equal distances in different times, since effects of time and of travel then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):

@@ -2,7 +2,7 @@
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
 model, and the plain inverse's drive into the model with effects: if one model were the stage, this would be the error
-with the other model's compensator. A correct effect changes the output by about as much as it explains.
+left by the other model's compensator. A correct effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hystgen.model import Model
 Array = NDArray[np.float64]
 
 SAMPLES = 6_000
-"""Maximum number of samples used from the start of a record: as many as the screening of effects compares."""
+"""Maximum number of samples used from the start of a record, as many as the screening of effects compares."""
 
 SMOOTHED = 5
 """[samples] A recorded output is averaged over this many, twice, to make a reference; residual noise is subtracted."""

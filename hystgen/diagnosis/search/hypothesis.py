@@ -44,12 +44,12 @@ _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
 """Parts of the chain after which the compared samples are picked: plays, filters right after, other filters, maps."""
 
 LEVEL_STEPS = 3
-"""Maximum number of Newton steps for the offset in front of a map: with its small curvature, each squares the error."""
+"""Maximum number of Newton steps for the offset in front of a map; as maps curve little, each squares the error."""
 
 
 RANK = 1e-10
-"""[fraction of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
-reduction keeps singular values to 2e-16 of the largest, so a value of this size still has six digits. Set by:
+"""[fraction of the largest singular value] Smaller ones count as zero, as two responses then have nearly the same
+shape. A reduction keeps singular values to 2e-16 of the largest, so a value of this size still has six digits. Set by:
 `test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
@@ -67,7 +67,7 @@ class Actuator(Ordered):
     gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
         default_factory=dict, compare=False, repr=False
     )
-    """Gain and offset over a run, stored with effect and run, since the `id` of a deleted object may be reused."""
+    """Gain and offset over a run, stored with effect and run, since a deleted object's `id` may be reused."""
     starts: Starts = ()
     """Start memories found in the presence of the effects: an item's turns, and the turns that replace them."""
 
@@ -168,11 +168,11 @@ class Actuator(Ordered):
 
     @cached_property
     def _moving(self) -> object:
-        """A key of everything, except the record, that the movement of the plays depends on."""
+        """A key made of everything, except the record, on which the movement of the plays depends."""
         return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, self.mover, self.starts
 
     def course(self, item: Item, y: Array) -> reduction.Course:
-        """The record as the plays see it, with another output (N,)."""
+        """The record as the plays see it, with a different output (N,)."""
         a = self.driven(item.run)
         course = reduction.Course(item.name, a, y, self._visited(item), 0, len(a))
         return joint.through_front(course, self.stages)
@@ -245,7 +245,7 @@ class Actuator(Ordered):
         return [effect for effect in self.effects if item.history is None or not effect.fades]
 
     def largest(self, item: Item, p: Array) -> Array:
-        """(k,) largest factors of `nuisances`: an effect with a small weight has a small start response."""
+        """(k,) largest factors of `nuisances`: an effect with a small weight responds little to its start."""
         span = acceptance.START_SPAN * float(np.sum(p)) * (item.session or item.run).drive_range
         found = np.concatenate([[np.inf], *(effect.largest(item.run) for effect in self.starting(item))])
         limited = np.isfinite(found)
@@ -272,7 +272,7 @@ class Actuator(Ordered):
         return item.errors.kept((self._mark(p), None if like is None else like[0]._mark(like[1])), make)
 
     def _mark(self, p: Array) -> object:
-        """A key of everything, except the record, that a prediction depends on."""
+        """A key made of everything, except the record, on which a prediction depends."""
         return self._numbers, p.tobytes()
 
     @cached_property
@@ -281,8 +281,8 @@ class Actuator(Ordered):
         return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
-        """(2, N) at the compared samples: error before fitting free components, its derivative with respect to the
-        offset."""
+        """(2, N) at the compared samples: the error before free components are fitted, and its derivative with respect
+        to the offset."""
 
         def make() -> Array:
             rows, constant = self.columns(item, p)
@@ -299,7 +299,7 @@ class Actuator(Ordered):
 
 
 def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
-    """Factors (k,) of columns (k, N) that fit y best between their limits; 0 lies between them."""
+    """Factors (k,) of columns (k, N) that fit y best within their limits, between which 0 lies."""
     table = np.empty((len(columns) + 1, len(y))).T
     table[:, :-1], table[:, -1] = columns.T, y
     triangle = reduction.reflected(table).triangle
@@ -447,7 +447,7 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 
 def _inside(front: Front, shape: Array) -> bool:
-    """Whether a search may begin at a shape, which must be within the bounds: clipped, it is not the nominal front."""
+    """Whether a search may begin at a shape: it must be within the bounds, as clipping would change the front."""
     low, high = front.bounds
     slack = front.slack(np.clip(shape, low, high))
     return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))
@@ -520,7 +520,7 @@ def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> An
 
 
 def _through(places: Array, nominal: Sequence[float]) -> Array:
-    """The thresholds, the nearest moved to each nominal threshold, so that a correct nominal model fits exactly."""
+    """The thresholds, with the nearest moved to each nominal one, so that a correct nominal model fits exactly."""
     moved = places.copy()
     for r in nominal:
         near = int(np.argmin(np.abs(places - r)))

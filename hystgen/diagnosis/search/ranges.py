@@ -33,7 +33,7 @@ range is fixed; only noise remains, so none was tried."""
 
 @dataclass(frozen=True)
 class End:
-    """A parameter at or beyond an end of its range, as `AtEnd`; `part`, `name`: index and name of its effect."""
+    """A parameter at or beyond an end of its range, as in `AtEnd`; `part`, `name`: index and name of its effect."""
 
     part: int
     name: str
@@ -78,7 +78,7 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
     """Largest fraction of a move `way` of parameter j that changes the effect and that the schema allows.
 
-    The schema must allow a little more, so that a search can take a difference there.
+    The schema must allow a little more, so that a search can form differences there.
     """
     here = _made(candidate, numbers, thresholds)
 
@@ -103,7 +103,7 @@ def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -
     try:
         made = candidate.build(numbers)
         checked = type(made).model_validate(made.model_dump())
-    except (ValueError, ArithmeticError):  # pydantic's are ValueErrors
+    except (ValueError, ArithmeticError):  # pydantic's errors are ValueErrors
         return None
     return None if any(True for _ in checked.problems(thresholds)) else fits.entry(checked)
 

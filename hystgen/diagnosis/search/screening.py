@@ -35,7 +35,7 @@ SLOPE_PLACES = 201
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: whether it adds a front, which is named after the fit.
+    """One way to extend a hypothesis. `front`: whether it adds a front, which gets its name only after the fit.
 
     `structure`: with all parameters free; `alone`: with only the extension's parameters free, from `starts`. `beyond`:
     label of the simpler option that this option contains and follows; `grown`: a start from that option's parameters.
@@ -51,7 +51,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of the whole hypothesis with these parameters for the extension; the other parameters stay."""
+        """The shape of the whole hypothesis with these parameters for the extension and the others unchanged."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -119,7 +119,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
     bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # bent one way over the whole range
-    # outside the drive range, neither a limit nor a small change to it has any effect: start inside
+    # outside the drive range, neither a limit nor a small change to it has any effect, so start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -407,7 +407,7 @@ class _Searches:
 
 
 def _while_falling(search: Search, steps: int) -> Search:
-    """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
+    """The search after `steps` steps, and after as many again for as long as they lower the error enough (`FALLING`).
 
     Failed steps do not end the search: each increases the damping of the next, until a step is short enough to lower
     the error. Ending at a failed step once meant judging a strongly cubic sensor by its start.
@@ -425,7 +425,7 @@ _Pool = parallel.Pool[_Trial, _Numbers]
 def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     """The options after a few steps on thinned records: the best on fitted and on held-out records.
 
-    Effects found before keep their parameters here; they are fitted jointly with the options that are followed up. A
+    Effects found earlier keep their parameters here; they are fitted jointly with the options that are followed up. A
     shape that contains a simpler one is tried if the simpler one helps, and kept if it helps more.
     """
     records, found = searches.records, [pair.rough for pair in searches.found]
@@ -521,7 +521,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
 
     def all_of(tasks: Sequence[_Trial]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the last of each
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the last result of each
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)

@@ -135,7 +135,7 @@ class _Removed:
 
 
 def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Removed]:
-    """Errors without and with an effect, for held-out and for fitted records."""
+    """Errors with and without an effect, for held-out and for fitted records."""
     terms = records.terms(now, best.fitted)
     return (
         _Removed(_without_merit(terms, best, records.held), best.errors),
@@ -146,7 +146,7 @@ def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Rem
 def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
     """Whether an effect removes enough from held-out or from fitted records, and shows in both.
 
-    An effect may be small in records like the held-out ones, however much of the fitted error it explains.
+    However much of the fitted error it explains, an effect may be small in records like the held-out ones.
     """
     shares = [each.removed / max(noise, each.left) for each in (held, fitted)]
     return max(shares) >= needed and min(shares) >= acceptance.SEEN_IN_BOTH
@@ -192,11 +192,11 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     however much better the best one fits (two shapes of one effect each have their own free states, which are part of
     the effect). Second, its held-out error is within a few per cent, and its fitted error is equal, larger by chance
     or, if a parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of
-    the best is the largest that is tried, all candidates that are `alike` are about as good: so much creep can also
+    the best is the largest tried, all candidates that are `alike` are about as good, since so much creep can also
     follow a lag. With equal numbers of parameters, the error over all records decides; if these errors are nearly
-    equal, the held-out error decides; then `place`: a lag, which every amplifier has, before a delay. A small lead on
-    held-out records, whose error may belong mostly to a third effect, does not make a candidate the best if its fitted
-    error is far larger than another's.
+    equal, the held-out error decides, and then `place`, which puts a lag, which every amplifier has, before a delay. A
+    small lead on held-out records, whose error may belong mostly to a third effect, does not make a candidate the best
+    if its fitted error is far larger than another's.
     """
     if not tried:
         return []
@@ -286,7 +286,7 @@ def alike(other: Tried, best: Tried, noise: float) -> bool:
 
 
 def rivals(best: Tried, tried: Sequence[Tried], records: Records) -> list[Tried]:
-    """Effects of other names that held-out records cannot separate from the accepted one, the best one first."""
+    """Effects with other names that held-out records cannot separate from the accepted one, the best one first."""
     return [each for each in tried if each.name != best.name and alike(each, best, records.noise)]
 
 
@@ -360,7 +360,7 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     The criterion applies to held-out and to fitted records. Many effects can remove part of a disturbance; the
     remaining error distinguishes a disturbance from a real effect. Records of one loop support no name if more than
     noise remains, and too few compared samples support none at all. If much remains, no parameter of an effect may be
-    at an end of its range unless nine tenths are explained: an effect so strong, slow or fast can follow part of any
+    at an end of its range unless nine tenths are explained: an effect that strong, slow or fast can follow part of any
     error, but not nine tenths of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
@@ -417,7 +417,7 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """An accepted effect, and the held-out rms without and with it."""
+    """An accepted effect, and the held-out rms with and without it."""
 
     name: str
     label: str
@@ -483,7 +483,7 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
     """The nominal structure with its weights, front and effect parameters refitted.
 
     The fit begins at the shape `start` and linear weights; if an output map bends the output, also at the `nominal`
-    weights, since samples beyond a limit hide the error of the weights.
+    weights, since samples beyond a limit hide the error in the weights.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
@@ -525,7 +525,7 @@ def again(fitted: Fitted, ready: Prepared) -> Fitted:
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """The outcome, with the errors of the model with p_0 raised to the floor of `identify`, and that model's
+    """The outcome with the errors of the model whose p_0 is raised to the floor of `identify`, and that model's
     weights."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
@@ -684,7 +684,7 @@ def _step(
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether only noise remains: no other first effect can do better, and `_exchanged` finds equally good ones."""
+    """Whether only noise remains; no other first effect can then do better, and `_exchanged` finds equal ones."""
     return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
@@ -794,7 +794,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights from linear fits without, then with the effects: far from its range, a sensor's curve misleads a fit."""
+    """Weights from linear fits without, then with effects, as a sensor's curve misleads a fit far from its range."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -826,7 +826,7 @@ def _exchanged(
 
     The first of two effects was chosen while the second was missing, and may have absorbed part of it; the second was
     then chosen next to a wrong first one. Rivals, too, are judged with all other effects present. `less`: the models
-    without one effect, as far as known; `names`: effects to be searched again, each the best of some round.
+    without one effect, where known; `names`: effects to be searched for again, each the best of some round.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
