@@ -25,13 +25,13 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
-/* The lower 31 bits, which are all that there are of what this is called with. */
+/* The lower 31 bits; no argument has any bits above them. */
 static inline uint32_t hystgen_low_31(uint64_t x) {
     return (uint32_t)x & 0x7fffffffu;
 }
 
-/* x > 0 as a mantissa of 31 bits. Returns the bits that it is shifted up by, before its upper word
-   is taken. */
+/* x > 0 as a mantissa of 31 bits. Returns the number of bits by which it is shifted up, before
+   its upper word is taken. */
 static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
     unsigned int raised = 0;
     unsigned int bits;
@@ -45,9 +45,9 @@ static unsigned int hystgen_mantissa(uint64_t x, uint32_t *mantissa) {
     return raised;
 }
 
-/* 2^bits x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; no
-   less than 2^59 where it is above that. The reciprocal 2^61 / y begins with the line 48/17 - 32/17
-   y, with an error of a 17th, and each step squares this relative error. */
+/* 2^bits x / y to a part in 2^28 and to the nearest integer, for x >= 0 and y > 0 below 2^62; at
+   least 2^59 where the exact quotient is larger. The reciprocal 2^61 / y begins with the line
+   48/17 - 32/17 y, whose relative error is at most 1/17, and each step squares this error. */
 HYSTGEN_API int64_t hystgen_quotient(int64_t x, int64_t y, unsigned int bits) {
     uint32_t number;
     uint32_t divisor;

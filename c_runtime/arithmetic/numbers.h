@@ -40,10 +40,10 @@ typedef hystgen_real_t hystgen_sum_t;
 #endif
 
 /* In a model with effects, signal: a value between blocks, in fixed point wider than a code;
-   narrow: a number of a block with half its bits; fine: the output of the drive side, in fixed
-   point finer than a code; travel: the distance covered by the drive; factor: multiplies a signal.
-   Without effects, and in floating point, all of them have the caller's type; only the loop
-   engine's signals in fixed point have the type of its play sums. */
+   narrow: a block's number with half the bits of a signal; fine: the output of the drive side,
+   in fixed point finer than a code; travel: the distance covered by the drive; factor:
+   multiplies a signal. Without effects, and in floating point, all of them have the caller's type;
+   only the loop engine's signals in fixed point have the type of its play sums. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef int32_t hystgen_narrow_t;

@@ -1,5 +1,5 @@
 /* Whether floating-point operations are library calls here; the corner engine then avoids them.
-   Beside them a call costs little, so functions that are inlined elsewhere then save code. */
+   Next to them a call costs little, so functions inlined elsewhere are called, to save code. */
 
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 #if (defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0)) ||                           \

@@ -1,4 +1,4 @@
-/* Operators of engine loop: all plays start at one value, or each at its own. Called by init. */
+/* Operators of the loop engine: plays start at one value, or each at its own. Called by init. */
 #ifndef HYSTGEN_LOOP_START_C
 #define HYSTGEN_LOOP_START_C
 #include "compensator/model.h"

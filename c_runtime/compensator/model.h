@@ -8,7 +8,7 @@
 #ifndef HYSTGEN_MODEL_H
 #define HYSTGEN_MODEL_H
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_HAS_CORNERS) && !defined(HYSTGEN_CHAIN)
-#define HYSTGEN_CHAIN /* engine loop is a chain */
+#define HYSTGEN_CHAIN /* the loop engine is a chain */
 #endif
 #include "hystgen_runtime.h"
 #ifndef HYSTGEN_CONFIGURED

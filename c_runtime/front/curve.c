@@ -18,7 +18,7 @@ static inline int64_t hystgen_part_of(int32_t y, int32_t h) {
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
-   coefficients from degree 0, of which all but c_0 fit a word together. */
+   coefficients from degree 0; all but c_0 together fit in a word. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {

@@ -115,7 +115,7 @@ def odd_polynomial(f: Function, terms: int, end: mp.mpf, bits: int) -> list[mp.m
 
 
 def tanh_reach(low: mp.mpf, last: mp.mpf, degree: int, tolerance: mp.mpf) -> mp.mpf:
-    """Where a piece that begins at `low` ends if its error stays within `tolerance`, at most `last`."""
+    """End of a piece that begins at `low` and whose error stays within `tolerance`; at most `last`."""
 
     def good(high: mp.mpf) -> bool:
         middle = (low + high) / 2
@@ -212,7 +212,7 @@ class Rounded(NamedTuple):
 
 
 def half_ulp(x: mp.mpf, bits: int) -> mp.mpf:
-    """Maximum error of rounding a result near x."""
+    """Maximum error in rounding a result near x."""
     return mp.ldexp(1, mp.frexp(x)[1] - 1 - bits) if x else mp.mpf(0)
 
 
@@ -254,7 +254,7 @@ def tanh_error(name: str, points: int = 200) -> float:
 
 
 def atanh_error(name: str, points: int = 200) -> float:
-    """As `tanh_error`, at `points` arguments up to 1/2 and in each octave of 1 - x down to 2^-bits."""
+    """Like `tanh_error`, but at `points` arguments up to 1/2 and in each octave of 1 - x down to 2^-bits."""
     bits, degree, t = SHAPES[name].bits, SHAPES[name].atanh_degree, atanh_tables(name)
     out = max(odd_error(mp.atanh, t["odd"], mp.mpf(i) / (2 * points), bits) for i in range(1, points + 1))
 

@@ -48,7 +48,7 @@ class Arithmetic(ABC):
     @cached_property
     @abstractmethod
     def computed(self) -> np.dtype[Any]:
-        """The type in which the bit reference computes."""
+        """The type in which the bit-exact reference computes."""
 
     @cached_property
     @abstractmethod

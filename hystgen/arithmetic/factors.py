@@ -1,4 +1,4 @@
-"""Products with constants; in fixed point, of whole numbers with non-integer ones: `c_runtime/arithmetic/factors.c`."""
+"""Products with constants; in fixed point, a whole number times a non-integer: `c_runtime/arithmetic/factors.c`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LOW_BITS = 20
 """Number of low bits that are multiplied separately; the upper part then has 31 bits, and both products fit into 64."""
 
 LARGEST = 2**51
-"""Exclusive bound of numbers to be multiplied: their upper part then has no more bits than a mantissa, 31."""
+"""Exclusive bound on numbers to be multiplied: their upper part then has no more bits than a mantissa, 31."""
 
 STATE_BITS = 60
 """Bits of a state without its sign. A product takes 50 of them; the shifts of factors allow for the ten dropped."""
@@ -27,7 +27,7 @@ MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
 """Bits of a mantissa without its sign, and range of shifts: a product drops 1 bit (for rounding) to 62 bits."""
 
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
-"""Exclusive bound of factors."""
+"""Exclusive bound on factors."""
 
 
 def factor(x: float | Fraction) -> tuple[int, int]:
@@ -49,7 +49,7 @@ def factor(x: float | Fraction) -> tuple[int, int]:
 
 
 def error(x: float | Fraction) -> float:
-    """Absolute error of rounding x to a factor."""
+    """Absolute error in rounding x to a factor."""
     mantissa, shift = factor(x)
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 

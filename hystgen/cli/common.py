@@ -157,7 +157,7 @@ def history_values(text: str | None) -> list[float] | None:
 
 
 def number_list(option: str, text: str, example: str) -> list[float]:
-    """The numbers of an option."""
+    """The numbers in the value of an option."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
@@ -204,7 +204,7 @@ def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[
 
 
 class ReadingArguments(TypedDict):
-    """Arguments of the command line for reading records."""
+    """Command-line arguments for reading records."""
 
     columns: str | None
     sample_time: float | None

@@ -14,7 +14,7 @@ from hystgen.cli import common
 
 
 def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> None:
-    """Write the drive records that a diagnosis needs; prints the files and the command to run after measuring."""
+    """Write the drive records that a diagnosis needs; print the files and the command to run after measuring."""
     from hystgen.basics import drawing
     from hystgen.report.plan import plan
 

@@ -89,9 +89,9 @@ def emitted_model(model: Model, options: Options) -> Model:
 
 @arguments.taking(emit_options, "emit")
 def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
-    """Names and text of the C files of one or several models; options as for `emit`. Nothing is written.
+    """Names and text of the C files for one or several models; options as for `emit`. Nothing is written.
 
-    Raises the same errors as `emit`, and ValueError if two models make files of the same name.
+    Raises the same errors as `emit`, and ValueError if two models make files with the same name.
     """
     models = _models(source)
     check_names(models)
@@ -107,7 +107,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """Possible faults of an inverse: the diagnosis cannot separate stage and sensor, or the drive may not come to
+    """Possible faults in an inverse: the diagnosis cannot separate stage and sensor, or the drive may not come to
     rest."""
     advice = "Record wide and nested loops, or use another sensor, and diagnose again"
     present = {*(effect.name for effect in model.effects), *["asymmetry"] * bool(model.cascade.stages)}
@@ -135,7 +135,7 @@ def _swing(model: Model) -> float:
 
 
 def check_names(models: Sequence[Model]) -> None:
-    """Raise ValueError if two models make files of the same name."""
+    """Raise ValueError if two models make files with the same name."""
     names = [model.name.lower() for model in models]  # macros and some file systems ignore case
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

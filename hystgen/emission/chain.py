@@ -136,7 +136,7 @@ def plays(t: ChainTables) -> tuple[str, str]:
 @dataclass(frozen=True)
 class Shape:
     """Properties of a chain, besides its blocks, that determine its functions and memory. `effects`: whether it has
-    any; `corners`: whether the engine is corners; `taps`: number of reference samples that are summed; `waiting`:
+    any; `corners`: whether it uses the corner engine; `taps`: number of reference samples that are summed; `waiting`:
     number of delayed drives; the others as in `Variant`."""
 
     form: Form
@@ -235,7 +235,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
 
 
 def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
-    """The glue of a model without effects in engine loop, which is a chain without blocks."""
+    """The glue of a model without effects in the loop engine, which is a chain without blocks."""
     shape = Shape(form)
     functions = [_functions(op, shape) for op in operators]
     return Glue({op: instance(op, shape, (), plays, 0) for op in operators}, "\n".join(functions), {})

@@ -137,7 +137,7 @@ def filled(entries: Iterable[str]) -> str:
 
 
 def entries(values: Iterable[Number], letters: str = "") -> str:
-    """Numbers of a table as written in C; `letters`: r for a plain number, f for a factor, c for four coefficients."""
+    """Numbers in a table as written in C; `letters`: r for a plain number, f for a factor, c for four coefficients."""
     rest = iter(values)
     if not letters:
         return ", ".join(map(literal, rest))
@@ -157,7 +157,7 @@ AnyTables: TypeAlias = "Tables | FixedTables | ChainTables"
 
 @dataclass(frozen=True)
 class Errors:
-    """Error bounds of the forward operator and the inverse against the double model, 0 for a missing operator;
+    """Error bounds for the forward operator and the inverse against the double model, 0 for a missing operator;
     `rounding`: the inverse's bound while `condition`, in words, holds."""
 
     forward: Number
@@ -246,7 +246,7 @@ class Form(ABC):
 
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:
-        """The memory of engine corners' plays in a model with effects."""
+        """The memory of the corner engine's plays in a model with effects."""
 
     def effects(self, t: ChainTables) -> list[Macro]:
         """Macros that a model with effects needs only in fixed point."""
@@ -262,7 +262,7 @@ class Form(ABC):
 
     @abstractmethod
     def between(self, low: Number, high: Number, part: float) -> Number:
-        """The number at this fraction of a range, in operations of the arithmetic."""
+        """The number at this fraction of a range, computed with the arithmetic's operations."""
 
     def counted(self, side: str, unit: str) -> str:
         """What the numbers of one side, drive or output, mean: a quantity in its unit, or codes."""
@@ -314,7 +314,7 @@ def truth(x: object) -> str:
 def pointers(
     numbers: Tables | FixedTables, places: Sequence[str], writer: Writer, whose: str = "model"
 ) -> ConstantTable:
-    """Pointers to the tables of engine loop."""
+    """Pointers to the loop engine's tables."""
     return writer.entries("tables_t", f"{whose}_tables", [*places, str(len(numbers.threshold) - 1)])
 
 
@@ -337,8 +337,8 @@ def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: st
 
 @dataclass(frozen=True)
 class Glue:
-    """The operators of a model as a chain: by operator the memory of an instance; functions; and by operator the calls
-    beyond those that every model has."""
+    """The operators of a model as a chain: the memory of an instance, by operator; functions; and, by operator, the
+    calls beyond those that every model has."""
 
     fields: Mapping[str, Sequence[Field]]
     functions: str
@@ -411,7 +411,7 @@ class EmittedModel:
 
     @cached_property
     def measured(self) -> Measured | None:
-        """The largest error that a search finds, for an inverse whose error only the range of the drive bounds."""
+        """The largest error that a search finds, for an inverse whose error is bounded only by the drive range."""
         limits = self.numbers.tables.limits
         whole = float(limits.drive.high[0]) - float(limits.drive.low[0])
         if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
@@ -424,7 +424,7 @@ class EmittedModel:
 
     @property
     def kernel_facts(self) -> frozenset[str]:
-        """What the kernels know of the model: only an inverse of plays alone solves for drives at a limit."""
+        """What the kernels know about the model: only an inverse of plays alone solves for drives at a limit."""
         limited = self.options.inverse and not (self.variant.fronts or self.variant.chain)
         return frozenset() if limited else frozenset({"HYSTGEN_HAS_NO_LIMIT"})
 
@@ -441,5 +441,5 @@ class EmittedModel:
 
     @property
     def corners(self) -> int:
-        """Number of corners that the corner engine keeps, 0 for engine loop."""
+        """Number of corners that the corner engine keeps, 0 for the loop engine."""
         return self.family.corners(self.cascade.pi.n) if self.options.engine == "corners" else 0

@@ -169,15 +169,15 @@ def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout)
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up as if
-    every search bisected its whole list.
+    """Operations of a kind of arithmetic, counted in the bit-exact reference (`tests/test_cost.py`) and rounded up as
+    if every search bisected its whole list.
 
-    `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
-    engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
-    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved and then follow an
-    applied drive that may differ; `solved`: multiplications per play of an inverse in the loop engine; `chained`: of an
-    inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind a
-    slew limit, and per halving of its search.
+    `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`:
+    multiplications, comparisons, and further comparisons per play and per bit of n, for plays, checks and limits, by
+    operator and engine, where `fast` is the corner engine without a front; `both`: the same for corners that are solved
+    and then follow an applied drive that may differ; `solved`: multiplications per play for an inverse in the loop
+    engine; `chained`: multiplications and comparisons for an inverse with effects, and both per play; `braked`:
+    multiplications for a lag behind a slew limit, and those per halving in its search.
     """
 
     factor: int
@@ -192,7 +192,7 @@ class Counts:
 FLOAT = Counts(
     1, "",
     {("forward", "loop"): (1, 7, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
-     # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
+     # the sign of a move costs a multiplication too; up to eight plays are tried one by one before either search
      ("forward", "corners"): (17, 18, 0, 2), ("inverse", "corners"): (28, 26, 0, 4),
      ("forward", "fast"): (17, 18, 0, 2), ("inverse", "fast"): (17, 18, 0, 2)},
     both=(34, 27, 0, 4), solved=3, chained=(4, 17, 4, 3), braked=(7, 2),
@@ -213,12 +213,12 @@ def _counts(t: AnyTables) -> Counts:
 
 
 def _refined(t: ChainTables) -> bool:
-    """Whether an inverse's solution has a remainder, which takes another search."""
+    """Whether an inverse's solution has a remainder, which requires another search."""
     return isinstance(t.plays, FixedTables) and bool(t.number.arriving_bits[0])
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications in one step of the blocks in front of the plays and behind them, for each operator."""
+    """Multiplications per step in the blocks in front of the plays and behind them, for each operator."""
     from hystgen.compensator.chain import blocks
     from hystgen.compensator.chain.parts import LED, PARTS
 
@@ -288,8 +288,8 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     """Operations of the plays of a model with effects in the loop engine: multiplications, further ones per play,
     comparisons, further ones per play, and tanh per play.
 
-    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, and each try
-    sums all of them; in floating point it also computes the slope of the sum.
+    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends require a search, in which
+    each try sums all of them and, in floating point, also computes the slope of the sum.
     """
     from hystgen.effects import plays
 
@@ -330,7 +330,7 @@ QUOTIENT = (8, 17)
 
 
 def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
-    """Maximum number of tries in a search, and its multiplications and comparisons in addition to those of the sums."""
+    """Maximum number of tries in a search, and its multiplications and comparisons besides those of the sums."""
     from hystgen.effects import plays
 
     if isinstance(m, plays.FixedMovingTables):
@@ -342,7 +342,7 @@ def _tries(m: MovingTables | FixedMovingTables) -> tuple[int, tuple[int, int]]:
 
 
 def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int]:
-    """Multiplications, comparisons and tanh of a bend per play, in floating point with its slope."""
+    """Multiplications, comparisons and tanh of a bend per play, in floating point including its slope."""
     from hystgen.effects import plays
 
     if m.bends == plays.STRAIGHT:

@@ -1,4 +1,4 @@
-"""Reasons why the emitted inverse of a model with effects may be of little use, as its banner and stderr word them."""
+"""Why the emitted inverse of a model with effects may be of little use, as worded in its banner and on stderr."""
 
 from __future__ import annotations
 

@@ -41,10 +41,10 @@ if TYPE_CHECKING:
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
            ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))
-"""Fields of the tables of engine loop, their types, and whether both operators read them."""
+"""Fields of the loop engine's tables, their types, and whether both operators read them."""
 
 RELAXING = COLUMNS[2:]
-"""The columns that engine loop has for plays that relax."""
+"""The columns that the loop engine has for plays that relax."""
 
 
 class FixedForm(Form):
@@ -241,7 +241,7 @@ def _envelopes(cascade: StaticModel) -> bool:
 
 
 def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
-    """The size of codes, and the error bounds of answers against the exact model."""
+    """The size of codes, and the error bounds on answers against the exact model."""
     drive, output = units(parameters)
     drive_lsb, output_lsb = float(form.drive_lsb), float(form.output_lsb)
     forward, inverse = form.forward_error, form.inverse_rounding
@@ -278,7 +278,7 @@ def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> lis
 
 
 def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[ConstantTable]:
-    """Pointers to the tables of engine loop, NULL for unread ones, and the ends of the plays' input."""
+    """Pointers to the loop engine's tables, NULL for unread ones, and the ends of the plays' input."""
     read = {field for field, _, both in COLUMNS if both or options.inverse}
     places = [f"{writer.name}_{field}" if field in read else "NULL" for field, _, _ in COLUMNS]
     return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
@@ -297,7 +297,7 @@ def _ends(t: FixedTables) -> list[str]:
 
 
 def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
-    """The tables of engine corners: one curve for both operators, and the contents of a start memory."""
+    """The corner engine's tables: one curve for both operators, and the contents of a start memory."""
     never = (t.reach[-1], t.way[-1], 0, 0, 1)
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
     low, high = t.limits.play.low[0], t.limits.play.high[0]

@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 
 COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
            ("lift", "lift", False))
-"""Fields of the tables of engine loop, the names of their arrays, and whether both operators read them."""
+"""Fields of the loop engine's tables, the names of their arrays, and whether both operators read them."""
 
 DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
              ("slope", 1, True), ("inverse_slope", 1, False))
-"""Arrays of a dead zone, how many more entries each has than break points, and whether both operators read it."""
+"""Arrays of a dead zone, how many more entries than break points each has, and whether both operators read it."""
 
 class FloatingForm(Form):
     """Floating point."""
@@ -154,7 +154,7 @@ def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, floa
 
 
 def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain: bool) -> Numbers:
-    """The numbers of a model, or with `chain` of the plays in a model with effects."""
+    """The numbers of a model, or with `chain` those of the plays in a model with effects."""
     stages = [_stage(t, j, f"stage_{j + 1}", options, writer) for j in range(len(t.stage_kind))]
     beside = [array for stage in stages for array in stage.arrays]
     if options.engine == "corners":
@@ -172,14 +172,14 @@ def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain:
 
 
 def _loop_tables(t: Tables, options: Options, writer: Writer) -> list[ConstantTable]:
-    """The tables of engine loop: arrays in one structure, and the start memory."""
+    """The loop engine's tables: arrays in one structure, and the start memory."""
     columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or options.inverse]
     start = [writer.array("real_t", "model_start", list(t.start))] * (len(t.start) > 1)
     return [writer.columns("real_t", "play", columns), *start]
 
 
 def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[ConstantTable]:
-    """The tables of engine corners, one operator after the other."""
+    """The corner engine's tables, one operator after the other."""
     found = []
     for operator, curve, starts in (
         ("forward", t.forward, (t.forward_first, t.forward_zero)),

@@ -59,13 +59,13 @@ def command(parameters: Parameters, options: Options) -> str:
 
 
 def conditions(one: EmittedModel) -> tuple[str, str]:
-    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words, on branches and on memory; empty if there is none."""
+    """The conditions for NAME_INVERSE_ROUNDING_ERROR in words, on branches and on memory; empty if there are none."""
     branch = "both take the same branch" if one.variant.branches else ""
     return branch, one.numbers.errors.condition or UNSLEWED * one.variant.slew
 
 
 def unbounded(one: EmittedModel) -> list[str]:
-    """A sentence if no bound of the inverse's error is known."""
+    """A sentence if no bound on the inverse's error is known."""
     if (found := one.measured) is None:
         return []
     unit = one.form.unit(one.units.drive)
@@ -394,7 +394,7 @@ def _line(mark: str, text: str) -> list[str]:
 
 
 def _unit(what: str, one: EmittedModel) -> str:
-    """A quantity with its unit: of the drive or the output, or a code in fixed point."""
+    """A quantity with the unit of the drive or the output, or a code in fixed point."""
     side = "drive" if what == "drive" else "output"
     words = {"drive": "drive", "output": "displacement", "reference": "reference"}[what]
     macro = f"{one.names.NAME}_{side.upper()}_LSB"

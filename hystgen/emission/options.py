@@ -15,7 +15,7 @@ OPTIONS = {
     "engine": ("corners", "loop"),
     "layout": ("self-contained", "shared-runtime", "single-header"),
 }
-"""Options of the command that a banner records, and their values."""
+"""Command options that a banner records, and their values."""
 
 LAYOUTS = OPTIONS["layout"]
 OPERATORS = OPTIONS["operator"]

@@ -1,7 +1,7 @@
 """The C of a user's own effect: its file, checked and split into pieces like the run time.
 
 The file is the user's code and stays unchanged, except that its names get the model's name as a prefix. It may contain
-the same as blocks of the catalogue: two types, one for the numbers and one for the memory, named as in Python, and four
+what the catalogue's blocks contain: two types, one for the numbers and one for the memory, named as in Python, and four
 functions, plus static functions that these call. Written with `hystgen_product`, it serves every arithmetic. Its C is
 not checked for errors: `hystgen verify` shows whether it compiles, and whether its bits are right.
 """
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
 
 MOST_BYTES = 1 << 16
-"""Largest C file of a user's effect; the largest block of the package has 6 kB."""
+"""Maximum size of the C file of a user's effect; the largest block in the package has 6 kB."""
 
 INCLUDE = '#include "hystgen_runtime.h"'
 """The only preprocessor line allowed in a file, which then compiles by itself."""
@@ -39,11 +39,11 @@ REFUSED = {
 """Words that a file may not contain, and their replacements."""
 
 GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
-"""Names of the run time that a file may use."""
+"""Run-time names that a file may use."""
 
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
-    """Types and functions of a model's user-defined blocks. Raises as `of_effect` does."""
+    """Types and functions of a model's user-defined blocks. Raises the same errors as `of_effect`."""
     effects = dict.fromkeys(getattr(t, "own_effects", ()))
     found = [of_effect(effect) for effect in effects]
     types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))

@@ -1,4 +1,4 @@
-"""The samples that an emitted self-test runs, and their answers from the bit reference."""
+"""The samples that an emitted self-test runs, and their answers from the bit-exact reference."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
 
 CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
-"""Letters of the calls in every model."""
+"""Letters for the calls that every model has."""
 
 LETTERS = {
     "push": "p", "settle": "q", "set_offset": "o", "set_temperature": "t", "set_gain": "g", "set_travel": "d",
 }
-"""Letters of the settings in models with effects."""
+"""Letters for the settings that models with effects have."""
 
 WIDE = ("set_travel",)
 """Settings with more bits than a code, too many for fixed-point samples."""
@@ -85,8 +85,8 @@ def operators(one: EmittedModel) -> list[Operator]:
 
 
 def _setting(t: ChainTables, call: str, turn: int) -> float:
-    """An argument of a setting, in fixed point before rounding to a code; every third exceeds the limits, if there are
-    any."""
+    """An argument for a setting, in fixed point before rounding to a code. Every third argument exceeds the limits, if
+    there are any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 

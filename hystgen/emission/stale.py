@@ -106,7 +106,7 @@ def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> 
 
 @dataclass(frozen=True)
 class Stale:
-    """A model whose files differ: its parameter file, the differences, all options `wanted` by the command line, and
+    """A model whose files differ: its parameter file, the differences, all options `wanted` on the command line, and
     `again`, which compares the files with other options."""
 
     parameters: str
@@ -134,7 +134,7 @@ def advice(
     """Commands that resolve all differences and orphans, each with its effect.
 
     One command writes everything as asked. For files made with other options, one command per set of options checks
-    them if they are up to date, else it writes them again with these options. `given`: options of the command line;
+    them if they are up to date and otherwise rewrites them with these options. `given`: options on the command line;
     `effects`: files of a user's own effects.
     """
     found = [each for model in models for each in model.differences]

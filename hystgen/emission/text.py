@@ -46,8 +46,8 @@ _GOOD = 7
 def literal(x: Number) -> str:
     """The shortest C literal for exactly this float32, float64 or whole number.
 
-    Whole numbers keep their value in every dialect: without a suffix, C90 and C++98 take one beyond `long` as unsigned;
-    and no dialect has a literal for the smallest number of a type.
+    Whole numbers keep their value in every dialect: without a suffix, C90 and C++98 treat one beyond `long` as
+    unsigned; and no dialect has a literal for the smallest number of a type.
     """
     if isinstance(x, np.integer | int):
         return _whole(int(x))
@@ -259,7 +259,7 @@ def _broken(code: str, indent: str) -> Iterator[str]:
 
 
 def _comment(lines: list[str]) -> Iterator[str]:
-    """A comment on lines of at most WIDTH; the excess of a line goes on lines of its own."""
+    """A comment on lines of at most WIDTH; the excess from a line goes on lines of its own."""
     indent = " " * (len(lines[0]) - len(lines[0].lstrip()))
     starred = any(line.startswith(indent + " *") for line in lines[1:])
     more = indent + (" * " if starred else "   ")

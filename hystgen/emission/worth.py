@@ -11,7 +11,7 @@ from hystgen.model import Model
 
 SWEEPS = 8
 """[sweeps] Number of sweeps over the whole range for which an effect is measured. For effects that settle, the result
-is within 2 % of that for 64 sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
+is within 2 % of that for 64 sweeps (lag, resonance; 16 % for a slew limit); creep and ageing never settle. Set by:
 benchmarks/chosen_numbers.py sweeps."""
 
 

@@ -14,7 +14,7 @@ FORWARD, INVERSE = 0, 2
 
 @jit
 def curve(t: Polynomials, which: int, x: int) -> int:
-    """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece on which x lies, with h = 0 .. 1 along it."""
+    """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that contains x, with h = 0 .. 1 along it."""
     j = t.first[which]
     high = j + t.pieces[which] - 1
     while j < high:

@@ -129,7 +129,7 @@ class _Checker:
         return path not in self._above_bad and not self.judged(path)
 
     def judged(self, path: Path) -> bool:
-        """Whether the structure at `path`, or of anything that contains it, is known to be unsound."""
+        """Whether the structure at `path`, or that of anything containing it, is known to be unsound."""
         return any(path[:n] in self._bad for n in range(len(path) + 1))
 
     def at(self, path: Path) -> Any:
@@ -149,7 +149,7 @@ class _Checker:
     # Structure --------------------------------------------------------------------------------------------
 
     def structure(self) -> schema.Parameters | None:
-        """The parameters, or None and pydantic's findings among the problems."""
+        """The parameters; or None, with pydantic's findings added to the problems."""
         parameters = None
         try:
             parameters = schema.Parameters.model_validate(self.data)
@@ -471,7 +471,7 @@ class _Checker:
 
 
 def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
-    """The names of a shape of an effect."""
+    """The literals that a shape of an effect allows for a key."""
     return get_args(shape.model_fields[key].annotation)
 
 
@@ -527,7 +527,7 @@ _BOUNDS = {
 
 
 def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said: str) -> str:
-    """A finding of pydantic in our own words."""
+    """A pydantic finding in our own words."""
     wrong, advice = next((said for start, *said in _TYPES if kind.startswith(start)), ("", ""))
     if key == "initial_state" and isinstance(value, Mapping | str):
         wrong, advice = "must be a number or a list of numbers", "write it like 0.0"

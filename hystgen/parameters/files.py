@@ -96,8 +96,8 @@ def make_parameters(
 ) -> Parameters:
     """The checked parameters from plain data in the form of the file (lists or tuples; None means left out).
 
-    An entry of `effects` may also be an `Effect`. Raises ParameterError; its problems have no positions, `file` names
-    the data in messages.
+    An entry of `effects` may also be an `Effect`. Raises ParameterError; its problems have no positions, and `file`
+    names the data in messages.
     """
     parameters, problems = check(_plain(data), user=_by_name(user_effects))
     if parameters is None:
@@ -106,7 +106,7 @@ def make_parameters(
 
 
 def _by_name(user_effects: Sequence[type[Effect]]) -> dict[str, tuple[type[Effect], ...]]:
-    """The user's effects by their names; several classes of one name are its shapes."""
+    """The user's effects by their names; several classes with one name are its shapes."""
     found: dict[str, tuple[type[Effect], ...]] = {}
     for effect in user_effects:
         name = effect.model_fields["name"].annotation.__args__[0]  # type: ignore[union-attr]
@@ -147,7 +147,7 @@ def canonical_json(parameters: Parameters) -> str:
     """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
     A density appears as given, not as the plays made from it. Keys added later (`emit.optimize`, `emit.compensation`,
-    `not_separable` and some of effects) appear only if they differ from the default, so that files without them keep
+    `not_separable` and some in effects) appear only if they differ from the default, so that files without them keep
     their hash.
     """
     data = _data(parameters)

@@ -28,7 +28,7 @@ from hystgen.effects import Unmeasured
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-"""Maximum numbers of stages, effects and characters of a description: more than any model needs, but quick to check."""
+"""Maximum numbers of stages, effects and characters in a description: more than any model needs, but quick to check."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
@@ -37,7 +37,7 @@ SCHEMA_ID = "urn:hystgen:parameters:1"
 
 _MEMBER = "\0member "
 MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
-"""Names of union members: elements of pydantic's locations that are not keys of the file."""
+"""Names of union members: elements of pydantic's locations that are not keys in the file."""
 
 
 def _whole(value: object) -> object:
@@ -139,12 +139,12 @@ class PIParameters(_Part):
 
     @property
     def density_error(self) -> float | None:
-        """Bound of the discretised density's error on the initial loading curve, output units; None without it."""
+        """Bound on the discretised density's error in the initial loading curve, output units; None without one."""
         return self._density_errors[0] if self._density_errors else None
 
     @property
     def density_output_error(self) -> float | None:
-        """Bound of the discretised density's error on the output for any drive and history; None without a density."""
+        """Bound on the discretised density's error in the output for any drive and history; None without a density."""
         return self._density_errors[1] if self._density_errors else None
 
 

@@ -1,7 +1,7 @@
 """Measured data in, computed columns out: one file is one experiment.
 
 Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems of a file are reported at once, each with its
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems in a file are reported at once, each with its
 position; small faults in a recording are repaired and counted in `Record.notes`.
 
 For a text file, `layout` determines how the table is written, `csv_file` splits it into lines and reads the rows, and
@@ -75,7 +75,7 @@ def read_records(
     """Read several data files as `read_record` does; records already in memory are kept.
 
     Samples in memory are called `record`, or `record 1`, `record 2`, .. if there are several. `points`: accept samples
-    without a time, as points taken one by one.
+    without a time and treat them as points taken one by one.
 
     `progress`: report once on stderr how files were interpreted ("read as: .."), with a progress bar on a terminal if
     reading takes more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for
@@ -146,13 +146,13 @@ def in_units(
     named: tuple[str, Mapping[str, str] | None] = ("units", None),
     sources: Sequence[object] = (),
 ) -> list[Record]:
-    """The records with each column of `need`, and temperatures, in a single unit; each conversion adds a note to the
+    """The records with each column in `need`, and temperatures, in a single unit; each conversion adds a note to the
     record.
 
     The target units are the user's (`named`: the option's name and the units of `input` and `output`), else those of a
     parameter file (`file`: its path and units), else those of `model`; if there are none, the first record with a unit
     decides. Columns without a unit are assumed to be in the target unit. `sources`: the records as given, for messages.
-    Raises RecordError with every column of a different quantity or in an unknown unit.
+    Raises RecordError naming every column that holds a different quantity or has an unknown unit.
     """
     everything = list(records)
     if not any(record.units for record in everything):

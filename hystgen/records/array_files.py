@@ -24,7 +24,7 @@ MATLAB_NUMBERS = frozenset(
 """MATLAB's numeric array classes."""
 
 TOGETHER = 1 << 20
-"""Samples of a .mat file loaded at a time; short vectors are loaded together up to this number."""
+"""Samples loaded from a .mat file at a time; short vectors are loaded together up to this number."""
 
 MOST_TOGETHER = 1000
 """Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested name."""
@@ -126,7 +126,7 @@ def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
 
 
 class _MatVectors:
-    """Vectors of a file; each search begins at the file's start, so neighbouring vectors are loaded together."""
+    """Vectors in a file; each search begins at the file's start, so neighbouring vectors are loaded together."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -153,16 +153,16 @@ class _MatVectors:
 
 
 Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[np.generic]]]]]
-"""Fields of a struct in a list: its texts, and its vectors as a length and a function that reads them."""
+"""Fields of one struct in a list: its texts, and for each vector its length and a function that reads it."""
 
 _LABELS, _UNITS = ("label", "name"), ("unit", "units")
 
 HOLDING = ("data", "values")
-"""Names of the fields that hold a struct's numbers; the struct's label says what they are."""
+"""Names of the fields that hold a struct's numbers; the struct's label says what these are."""
 
 
 def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
-    """The vectors of a list of structs, named by the text next to them: signals of Simulink, traces of ControlDesk.
+    """The vectors in a list of structs, named by the text next to them: Simulink signals, ControlDesk traces.
 
     Vectors without a text of their own are named by their position in the list, `(2).values`.
     """

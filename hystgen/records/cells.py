@@ -35,7 +35,7 @@ def is_time(cell: str) -> bool:
 class Clock:
     """Reads the times of one column, in file order, as seconds from the first time.
 
-    `problem`: why the times cannot be trusted, empty if there is no reason.
+    `problem`: why the times cannot be trusted; empty if they can be.
     """
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ MISSING = frozenset(
 """Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "
-"""The delimiter of columns that are separated by any number of blanks, for example for alignment."""
+"""The delimiter for columns separated by any number of blanks, for example to align them."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
 """The beginning of a comment line."""
@@ -150,7 +150,7 @@ class Dialect:
         return cells
 
     def number(self, cell: str) -> float:
-        """The number of a cell, NaN if the cell is empty or marks a missing value. Raises ValueError for anything
+        """The number in a cell, NaN if the cell is empty or marks a missing value. Raises ValueError for anything
         else."""
         if cell.strip().lower() in MISSING:
             return float("nan")
@@ -173,7 +173,7 @@ class Dialect:
         return _EITHER.fullmatch(cell.strip()) is not None
 
     def fault(self, cell: str) -> tuple[str, str]:
-        """The fault of a cell that is not a number: its kind (empty if it has none), and advice."""
+        """The fault in a cell that is not a number: its kind (empty if it has none), and advice."""
         text = cell.strip()
         if self.either(text):
             return "comma", "its comma may be a decimal comma or a thousands mark: write decimals with a point"

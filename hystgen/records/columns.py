@@ -28,7 +28,7 @@ TIMES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
     **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
 }
-"""Factor and divisor to seconds: x/1000 is the double nearest to the intended time; 0.001*x may not be."""
+"""Factor and divisor to get seconds: x/1000 is the double nearest to the intended time; 0.001*x may not be."""
 
 _ONE = (
     r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
@@ -286,7 +286,7 @@ class Column:
 
     @property
     def folder(self) -> str:
-        """Everything before the last part: the group or struct it is in, empty at the top level."""
+        """Everything before the last part: the group or struct that holds the column; empty at the top level."""
         return self.name.removesuffix(self.own)
 
 
@@ -305,7 +305,7 @@ def column(
 
 
 def meaning(c: Column) -> str:
-    """Which of our columns the words of a name indicate; empty if they indicate none, or more than one."""
+    """Which of our columns the words in a name indicate; empty if they indicate none, or more than one."""
     words = _words(c)
     if words & OTHERWISE:
         return ""
@@ -319,7 +319,7 @@ def meaning(c: Column) -> str:
 
 
 def _words(c: Column) -> set[str]:
-    """Words of a column's name, in lower case."""
+    """The words in a column's name, in lower case."""
     # In "Control Voltage of OutputChan1", only the words before "of" name the quantity
     quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
     words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
@@ -410,7 +410,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """Report columns of the file that are used for two needed columns."""
+        """Report columns in the file that serve as two needed columns."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue
@@ -424,7 +424,7 @@ class Finder:
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
     def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
-        """The only column whose name means `ours`; for a time, else the first column if its unit is a unit of time."""
+        """The only column whose name means `ours`; else, for a time, the first column if its unit is one of time."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
         meant = [c for c in free if meaning(c) == ours]

@@ -36,7 +36,7 @@ WIDE = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_U
 """Encodings by the byte order mark that a file begins with."""
 
 LOOKED_AT = 1 << 10
-"""[bytes] Length of the start of a file that is searched for signs of UTF-16 without a byte order mark."""
+"""[bytes] How much of a file, from its start, is searched for signs of UTF-16 without a byte order mark."""
 
 
 def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
@@ -198,7 +198,7 @@ def _is_below_text(lines: Sequence[str], header: int) -> bool:
 
 
 def _below(text: str, first: int) -> str:
-    """The text from line `first` on; lines count from 1."""
+    """The text from line `first` on; lines are numbered from 1."""
     start = 0
     for _ in range(first - 1):
         start = text.find("\n", start) + 1
@@ -400,7 +400,7 @@ class _Body:
             if '"' in text:
                 return False
             blank = (data == ord(" ")) | (data == ord("\t")) | ends
-            # Between blanks, starts of cells are counted; otherwise delimiters, of which a line has one fewer
+            # Where blanks separate cells, starts of cells are counted; else delimiters, one fewer in each line
             between = ~blank & np.concatenate([[True], blank[:-1]])
             extra = 1
         else:
@@ -419,7 +419,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Read line by line: reports wrong cells with their positions, and accepts missing cells."""
+        """Read line by line, reporting wrong cells with their positions and accepting missing ones."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []

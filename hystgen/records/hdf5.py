@@ -30,7 +30,7 @@ LONGEST = 1 << 10
 """[characters] Longest text that may be a label or a unit; longer texts are not read."""
 
 DEEPEST = 32
-"""[levels] Nesting limit of groups, like that of structs in `mat_nesting`: 20,000 levels take minutes, since the path
+"""[levels] Nesting limit for groups, like that for structs in `mat_nesting`: 20,000 levels take minutes, since the path
 of each group contains the names of all groups above it."""
 
 _MATLAB_OWN = ("#refs#", "#subsystem#")

@@ -19,7 +19,7 @@ from hystgen.records.columns import STANDARD, Step, column, meaning, unit_alone
 from hystgen.records.reading import Reading
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": '"|"', BLANKS: "blanks"}
-"""Separators of cells, least ambiguous first, and their names."""
+"""Cell separators, least ambiguous first, and their names."""
 
 _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
 """A ruled line, made of dashes and the like."""
@@ -35,11 +35,11 @@ EXAMPLE = "1,2,3"
 
 @dataclass
 class TableLayout:
-    """A text table: `names` and `units` of its columns; lines count from 1.
+    """A text table: `names` and `units` of its columns; lines are numbered from 1.
 
-    `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
+    `also`: second names for columns; `header`: line with the names, None if there is none; `first`: first line of the
     rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
-    `clocks`: columns of times of day; `rows`: number of rows stated in the file; `another`: text that would begin
+    `clocks`: columns with times of day; `rows`: number of rows stated in the file; `another`: text that would begin
     another table; `segments`: further headers among the rows, after which the table continues.
     """
 
@@ -66,7 +66,7 @@ class _Line:
 
 @dataclass(frozen=True)
 class _View:
-    """The lines as read in one dialect: rows of `width` cells; `score`: how many more cells are numbers than text."""
+    """The lines as read in one dialect, in rows of `width` cells; `score`: number cells minus text cells."""
 
     dialect: Dialect
     width: int
@@ -112,7 +112,7 @@ def _shown(reading: Reading, lines: Sequence[str]) -> TableLayout:
 
 
 def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
-    """Every possible separator of cells, with either decimal mark."""
+    """Every possible cell separator, with either decimal mark."""
     quoted = any('"' in line for line in lines)
     delimiters = [reading.delimiter] if reading.delimiter else list(DELIMITERS)
     found = []
@@ -349,8 +349,8 @@ _SPECIAL = ("***Start_Special***", "***End_Special***")
 def labview(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the tags, according to NI's "Specification for the LabVIEW Measurement File (.lvm)".
 
-    The tags of the file, then those of a segment, both ending in `***End_of_Header***`, come before names and rows.
-    Further segments continue the rows, see `Segments`; without a time column they are refused.
+    The file's tags, then a segment's, each list ending in `***End_of_Header***`, come before the names and rows.
+    Further segments continue the rows (see `Segments`); without a time column they are refused.
     """
     if not lines[0].startswith("LabVIEW Measurement"):
         return None
@@ -418,11 +418,11 @@ def _of_segment(
 
 @dataclass
 class Segments:
-    """Segments after the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
+    """Segments of a LabVIEW file after the first: rows of the same channels, each segment under its own header.
 
     By NI's specification, times are seconds since the date and time of the segment if `Time_Pref` is `Relative`, and
-    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: names
-    and tags of the first segment.
+    since the same instant throughout the file if it is `Absolute`. `place`: the time column; `names`, `tags`: names and
+    tags of the first segment.
     """
 
     reading: Reading
@@ -479,7 +479,7 @@ class Segments:
 
 
 def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
-    """Tags and their values, without those of special blocks."""
+    """Tags and their values, except those in special blocks."""
     tags: dict[str, list[str]] = {}
     special = False
     for line in lines:
@@ -500,7 +500,7 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
         raise reading.refuse(f'{tag} has "{printable(text)}", which is not a number; export it again', line) from None
 
 
-# GCS arrays of Physik Instrumente ----------------------------------------------------------------------------
+# GCS arrays from Physik Instrumente --------------------------------------------------------------------------
 
 
 LARGEST_CODE = 1 << 16
@@ -553,11 +553,11 @@ def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> i
     return int(text)
 
 
-# CSV of Tektronix oscilloscopes ------------------------------------------------------------------------------
+# CSV from Tektronix oscilloscopes ----------------------------------------------------------------------------
 
 
 _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
-"""Settings that distinguish these files from others with a column TIME."""
+"""Settings that distinguish these files from others with a TIME column."""
 
 
 def tektronix(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
@@ -596,7 +596,7 @@ def _decimal_commas(lines: Sequence[str], delimiter: str) -> bool:
     return any(line.startswith(f"Sample Interval{delimiter}") and "," in line for line in lines)
 
 
-# CSV of Rigol oscilloscopes ----------------------------------------------------------------------------------
+# CSV from Rigol oscilloscopes --------------------------------------------------------------------------------
 
 
 _RIGOL_NEW = re.compile(r"(?P<names>.*?),\s*t0\s*=\s*(?P<start>[^,]*?)\s*,\s*tInc\s*=\s*(?P<step>[^,]*?)\s*,*\s*")
@@ -630,7 +630,7 @@ def rigol(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
                   steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])
 
 
-# CSV of Yokogawa's ScopeCorders and oscilloscopes -------------------------------------------------------------
+# CSV from Yokogawa's ScopeCorders and oscilloscopes -----------------------------------------------------------
 
 
 def yokogawa(reading: Reading, lines: Sequence[str]) -> TableLayout | None:

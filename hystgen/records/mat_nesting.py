@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import IO
 
 MOST = 32
-"""[levels] Nesting limit of structs and cells: ControlDesk and Simulink save up to five levels. scipy 1.17 reads 1000,
+"""[levels] Nesting limit for structs and cells: ControlDesk and Simulink save up to five levels. scipy 1.17 reads 1000,
 and crashes the process at 5000 with an 8 MB stack. Set by: tests/test_record_formats.py TestNesting."""
 
 MANY = 10_000_000

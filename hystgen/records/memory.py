@@ -35,7 +35,7 @@ class Frame(Protocol):
 
 Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.generic] | tuple[ArrayLike, ...]
 """Samples in memory: a mapping or data frame of named columns; or an array (N, 2) or (N, 3), or a tuple of arrays (N,),
-of drive and displacement, preceded by the time if there are three."""
+of drive and displacement, preceded by the time if there are three columns."""
 
 _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
 """Options named in messages about files, which become arguments of the call in messages about data in memory."""

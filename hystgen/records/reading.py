@@ -23,8 +23,8 @@ SAME_STEP = 1e-6
 """Largest relative difference between sample times that count as equal: files write seven digits or a round number."""
 
 BESIDE = 2
-"""[times] Memory needed to read a record relative to the memory of its numbers, because of sorted copies and masks: 1.7
-with 2e7 samples of HDF5 (2026-11-26)."""
+"""[times] Memory needed to read a record, relative to that of its numbers; sorted copies and masks take the rest.
+Measured: 1.7 with 2e7 samples from an HDF5 file (2026-11-26)."""
 
 NO_SECONDS = 1e11
 """Times this large are not seconds: seconds since 1970 reach this number in the year 5138, milliseconds did in 1973."""
@@ -124,7 +124,7 @@ class Reading:
 
     @contextmanager
     def parsing(self, kind: str) -> Iterator[None]:
-        """Report any error of a library that cannot read a file as a problem of the file."""
+        """Report any error raised by a library that cannot read a file as a problem with the file."""
         try:
             yield
         except RecordError:
@@ -262,17 +262,17 @@ class Reading:
 
 
 MOST_TOGETHER = 64
-"""Largest number of columns of a matrix that may be a record; a wider one is an image or a map."""
+"""Largest number of columns in a matrix that may be a record; a wider one is an image or a map."""
 
 
 def in_matrix(shape: tuple[int, ...]) -> int:
-    """Number of columns of a matrix that may be a record, in either orientation; 0 for anything else."""
+    """Number of columns in a matrix that may be a record, in either orientation; 0 for anything else."""
     two = len(shape) == 2 and shape[0] != shape[1]
     return min(shape) if two and 2 <= min(shape) <= MOST_TOGETHER else 0
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:
-    """Length of a vector, as a row, a column or one-dimensional; 0 if it is not a vector."""
+    """Length of a vector, whether a row, a column or one-dimensional; 0 for anything else."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
 
@@ -379,7 +379,7 @@ def _repeats(t: Array) -> bool:
 
 
 def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> Array:
-    """Replace repeated times by times at the given sample time, unless the repeated times contradict it."""
+    """Replace repeated times with times at the given sample time, unless the repeated times contradict it."""
     rows = np.flatnonzero(keep)
     steps = np.diff(t[rows])
     finest = float(np.min(steps[steps > 0.0]))
@@ -453,7 +453,7 @@ drive, in units per second, may be 1e10 times the drive itself.
 """
 
 NINES = 3
-"""Minimum number of digits of a fill value made of nines, such as -999 or 99999.9."""
+"""Minimum number of digits in a fill value made of nines, such as -999 or 99999.9."""
 
 ENDS_OF_INTEGERS = frozenset(
     float(x) for bits in (16, 32, 64) for x in (2 ** (bits - 1) - 1, 2 ** (bits - 1), 2**bits - 1)
@@ -462,7 +462,7 @@ ENDS_OF_INTEGERS = frozenset(
 
 
 def no_value(x: Array) -> NDArray[np.bool_]:
-    """Whether each number (N,) of a column stands for "no value", as every non-finite number does.
+    """Whether each number (N,) in a column stands for "no value", as every non-finite number does.
 
     A number below `LARGEST` stands for "no value" if it is a usual fill value (all nines, the extreme of an integer
     type) and lies farther from the rest of the column than their spread, since a column may also pass through -999. The
@@ -484,7 +484,7 @@ def no_value(x: Array) -> NDArray[np.bool_]:
 
 
 def _fill(number: float, column: Array) -> bool:
-    """Whether a number of a column looks like a fill value."""
+    """Whether a number in a column looks like a fill value."""
     digits = f"{abs(number):.10g}".replace(".", "")
     if len(digits) >= NINES and set(digits) == {"9"}:
         return True

@@ -25,7 +25,7 @@ TEMPERATURE = "temperature"
 
 PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "": 0, "k": 3, "M": 6, "G": 9}
 WORDS = {"pico": -12, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3, "mega": 6}
-"""Powers of ten of prefixes, for symbols and for whole words."""
+"""Prefixes and their powers of ten, for symbols and for whole words."""
 
 _DEGREE = Fraction(math.pi) / 180
 _OERSTED = Fraction(1000) / (4 * Fraction(math.pi))
@@ -64,11 +64,11 @@ TEMPERATURES = {
         ("degF", "deg F", "\u00b0F", "\u2109", "fahrenheit", "F"), (Fraction(5, 9), _ZERO - Fraction(160, 9))
     ),
 }
-"""Size in K, and the temperature at 0 in K. C and F are temperatures only in a temperature column."""
+"""Size in K, and the temperature in K at 0. C and F are temperatures only in a temperature column."""
 
 
 class Quantity(NamedTuple):
-    """A unit's quantity: `kind`, named by its base unit, with `size` and `zero` of the unit in that base unit."""
+    """A unit's quantity: `kind`, named by its base unit, with the unit's `size` and `zero` in that base unit."""
 
     kind: str
     size: Fraction
@@ -130,7 +130,7 @@ class UnitGoal(NamedTuple):
     """The target unit for the drive or the displacement of records.
 
     `unit`: empty if the first record with a unit decides; `whose`: the quantity's name in messages; `named`: given by
-    the user, who thereby declares the meaning of an unknown unit; `told`: whether to report that a record has decided.
+    the user, who thereby declares the meaning of an unknown unit; `told`: whether to report that a record decided it.
     """
 
     unit: str = ""

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page on the missing effects, the error due to each, and the remaining error."""
+"""The report on a diagnosis: one page on the missing effects, the error due to each, and the remaining error."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ HOLD = 16
 """Minimum number of samples at rest for errors to be drawn over the time since the drive stopped."""
 
 WINDOWS = 12
-"""Number of stretches of a record whose rms is drawn over the session."""
+"""Number of stretches that a record is split into; the rms of each is drawn over the session."""
 
 
 def steps(found: Diagnosis) -> list[tuple[str, float]]:
@@ -51,7 +51,7 @@ def steps(found: Diagnosis) -> list[tuple[str, float]]:
 
 
 def gap(found: Diagnosis, width: float) -> Figure:
-    """The reduction of the held-out error by each step, down to the noise."""
+    """The reduction in the held-out error at each step, down to the noise."""
     stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
     values = [*(value for _, value in stages), noise]
@@ -97,7 +97,7 @@ def gap(found: Diagnosis, width: float) -> Figure:
 
 
 def worst(found: Diagnosis) -> list[Signals]:
-    """The held-out records with the largest error of the refitted model, the worst first."""
+    """The held-out records with the largest error in the refitted model, the worst first."""
     held = [each for each in found.signals if each.held_out and np.isfinite(each.before).any()]
     return sorted(held, key=lambda each: -_rms(each.before))[:SHOWN]
 

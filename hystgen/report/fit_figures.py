@@ -1,4 +1,4 @@
-"""The figures of a fit, each for a wide page and for a phone with the same content."""
+"""The figures of a fit, each laid out for a wide page and for a phone, with the same content."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS, FEWEST = 40, 5
-"""Number of bins for the residual's mean, and minimum number of samples in a bin that is drawn."""
+"""Number of bins for the residual's mean, and minimum number of samples for a bin to be drawn."""
 
 TAIL, FAR = 0.002, 3.0
 """[quantiles, times] An axis ends at these quantiles if the extremes are this many times farther out."""
@@ -280,7 +280,7 @@ def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) 
 
 
 def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
-    """Measured loops and the model's, of a fitted and of a held-out record."""
+    """Measured and modelled loops for a fitted record and a held-out record."""
     pair, units = drawn_ones(shown), units_of(fit)
     figure = drawing.figure(9.6, 4.4) if wide else drawing.figure(4.4, 4.0 * len(pair))
     axes = figure.subplots(1, len(pair), squeeze=False) if wide else figure.subplots(len(pair), 1, squeeze=False)
@@ -290,7 +290,7 @@ def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
 
 
 def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
-    """Measured and model over time with the residual below, of a fitted and of a held-out record."""
+    """Measured and model over time with the residual below, for a fitted record and a held-out record."""
     pair, units = drawn_ones(shown), units_of(fit)
     figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
     rows = figure.subfigures(len(pair), 1, squeeze=False)
@@ -340,7 +340,7 @@ def judged(shown: Sequence[Shown]) -> list[Shown]:
 
 
 def noise_of(shown: Sequence[Shown]) -> float | None:
-    """The largest noise of the records; None if it is unknown for any record."""
+    """The largest noise in the records; None if it is unknown for any record."""
     found = [each.noise for each in shown]
     known = [sigma for sigma in found if sigma is not None]
     return max(known) if known and len(known) == len(found) else None

@@ -1,4 +1,4 @@
-"""The report of an identification: one page, with its figures as separate files."""
+"""The report on an identification: one page, with its figures as separate files."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ def _data(shown: Sequence[Shown]) -> list[Text | HtmlTable | Listing]:
 
 
 def _masks(each: Shown) -> tuple[Sequence[int], ...]:
-    """The samples of a record that the table counts, in its order."""
+    """The samples in a record that the table counts, in the table's order."""
     used = each.used
     outputs = used.skipped, used.ignored, used.outliers, used.stretches
     return tuple(found.tolist() for found in (*outputs, used.bridged, used.gaps, used.left_out))

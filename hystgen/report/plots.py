@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def show_tracking(tracking: Tracking, path: str | os.PathLike[str]) -> None:
-    """The motion of each record and the tracking error of each compensator over time, as PNG or SVG.
+    """The motion in each record and the tracking error of each compensator over time, as PNG or SVG.
 
     Raises PlotError.
     """

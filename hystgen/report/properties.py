@@ -18,7 +18,7 @@ HARD_RATIO = 1e6
 """Slope ratio above which a warning is given: a float32 rounding error, 6e-8, becomes 6 % of the drive."""
 
 WIDE = 0.05
-"""Fraction of the drive range above which an error of the inverse is mentioned."""
+"""Fraction of the drive range above which an error in the inverse is mentioned."""
 
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
@@ -105,7 +105,7 @@ def facts(model: Model, within: float = SETTLED) -> dict[str, object]:
 
 
 def settling(model: Model, within: float = SETTLED) -> str:
-    """Settling of the model in a sentence, or the reason why it is unknown."""
+    """The model's settling in a sentence, or the reason why it is unknown."""
     try:
         return model.settling(within).sentence(model.parameters.units.output)
     except EffectsError as error:
@@ -207,7 +207,7 @@ def warnings(model: Model) -> list[str]:
 
 
 def _inverse_error(model: Model, arithmetic: str) -> float:
-    """Largest difference between the emitted inverse and the exact one, input units. Raises FormatError."""
+    """Largest difference between the emitted inverse and the exact one, in input units. Raises FormatError."""
     if arithmetic in FLOATING:
         return error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic)).rounding
     form = _format(model, arithmetic)

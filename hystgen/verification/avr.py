@@ -25,7 +25,7 @@ CONSTANTS = (".data", ".rodata")  # both are in RAM, and their initial values in
 
 @dataclass(frozen=True)
 class Size:
-    """The number of plays of a model, and the memory that it is expected to take."""
+    """The number of plays in a model, and the memory that it is expected to take."""
 
     plays: int
     memory: cost.MemoryBytes
@@ -56,8 +56,8 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> list[Row]:
-    """One row: result of the self-test on the emulated board, and memory of the module. `size`: shows whether a model
-    is too large for the board; None if it cannot be built for one.
+    """One row: result of the self-test on the emulated board, and memory of the module. `size`: shows whether the model
+    is too large for the board; None if it cannot be built for any board.
     """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"

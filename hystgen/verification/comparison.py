@@ -1,4 +1,4 @@
-"""Verification records with the output of the bit reference, and the comparison of compiled output with it."""
+"""Verification records with the output of the bit-exact reference, and the comparison of compiled output with it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Mismatch:
 def expected_record(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, calls: signals.Calls
 ) -> Expected:
-    """A record of calls, with values of type `real`, and the output of the bit reference."""
+    """A record of calls, with values of type `real`, and the output of the bit-exact reference."""
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
     answer, status = reference.answers(numbers, inverse, op, x)
@@ -49,7 +49,7 @@ def expected_record(
 def expected_records(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, length: int
 ) -> list[Expected]:
-    """The verification records of an operator with the output of the bit reference."""
+    """The verification records of an operator with the output of the bit-exact reference."""
     suite = signals.suite(numbers, real, inverse, length)
     return [expected_record(numbers, real, inverse, calls) for calls in suite]
 

@@ -39,7 +39,7 @@ DEBIAN = {
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf", "avr-gcc": "gcc-avr avr-libc", "avr-size": "binutils-avr",
     "simavr": "simavr",
 }
-"""Debian packages of the commands that a verification calls."""
+"""Debian packages that provide the commands a verification calls."""
 
 
 class CompileError(RuntimeError):
@@ -130,7 +130,7 @@ def none_found() -> MissingError:
 
 @functools.cache
 def _own(name: str) -> dict[str, str]:
-    """Environment variables that a compiler needs: for zig, a cache folder if it cannot be in the home folder."""
+    """Environment variables that a compiler needs: for zig, a cache folder if the home folder cannot hold it."""
     if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")

@@ -1,4 +1,4 @@
-"""An emulated core: runs functions of a flat image, counts the instructions of every step, measures stack use."""
+"""An emulated core, which runs functions in a flat image, counts instructions per step, and measures stack use."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ class Core:
 
     @property
     def stack(self) -> int:
-        """Bytes that the deepest call used below the harness's frame, as far as the painted stack was overwritten."""
+        """Bytes that the deepest call used below the harness's frame, judged by where the paint was overwritten."""
         painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
         untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
         return self._stack_at_step - (self._top - STACK + untouched)
@@ -195,7 +195,7 @@ class Core:
     def run(
         self, name: str, op: str, call: Bytes, x: NDArray[np.number], counted: str = "step"
     ) -> tuple[NDArray[np.number], Bytes]:
-        """Let the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step or
+        """Let the harness of operator `op` make the calls in a record, counting the instructions of NAME_OP_step or
         NAME_OP_commit."""
         sizes = (len(x), x.nbytes, x.nbytes, len(x))
         places, end = [], RECORDS

@@ -13,11 +13,11 @@ from hystgen.verification.loading import load
 
 
 class CompiledInstance:
-    """An instance driven by NAME_OP_init and NAME_OP_step in the C that a model emits, with values as the C takes them.
+    """An instance driven by NAME_OP_init and NAME_OP_step in a model's C, with values in the form that the C takes.
 
     `options`: those of `emit`, for a single operator. `compiler`: `gcc`, `clang` or `zig`; by default, the first that
     is installed. It is called as users call it, in its default dialect. The files are in a temporary folder. Raises
-    CompileError, also if there is no compiler, LoadError, and ValueError for another name.
+    LoadError, CompileError (also if there is no compiler), and ValueError for any other name.
     """
 
     def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:
@@ -33,7 +33,7 @@ class CompiledInstance:
             f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"
             f"{real} {name}_{op}_step(void *, {real});"
         )
-        # A loaded library survives without its file; only Windows keeps the file until then
+        # A loaded library survives without its file; only Windows keeps the file while it is loaded
         with writing.temporary() as folder:
             library = folder / "instance.so"
             written = sources.write(folder, model, options)

@@ -15,7 +15,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 
 POINTS = 2000
-"""Number of points of a path: following the plays one by one in Python takes about 0.1 s for this many."""
+"""Number of points in a path: following the plays one by one in Python takes about 0.1 s for this many."""
 
 # Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start to follow after
 # a turn here, a limit of the drive, or any drive
@@ -28,8 +28,8 @@ COMMITTED, THERE = 0.6, 0.7
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
-    operator after the call (meaningless for init), `risen` whether the output rose."""
+    """Points in order: `op` is init, reset or step; each `drive` is inside the range; `output` is that of the
+    forward operator after the call (meaningless for init); `risen` tells whether the output rose."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -102,7 +102,7 @@ def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np
 
 
 def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The output after every call; reset returns none, but a step with the same drive does."""
+    """The output after every call; a reset returns none, so a step with the same drive follows it."""
     times = np.where(op == slots.OP_RESET, 2, 1)
     last = np.cumsum(times) - 1
     calls = np.full(int(times.sum()), slots.OP_STEP, dtype=np.uint8)

@@ -150,7 +150,7 @@ class Report:
         return _json(self.content())
 
     def suite(self, title: str = "") -> ElementTree.Element:
-        """A JUnit test suite with one test case per row, a failure if the C is at fault and an error if a tool is
+        """A JUnit test suite with one test case per row: a failure if the C is at fault, an error if a tool is
         missing; `title`: used in place of the model's name."""
         title = title or self.name
         suite = ElementTree.Element(

@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of `PART` calls, the status is left unread after one of these fractions of the calls
+# Calls come in parts of `PART`; in each part, one of these fractions of the calls leaves the status unread
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
@@ -119,8 +119,8 @@ def suite(
 ) -> Iterator[Calls]:
     """Records of `length` calls: name, operations, and arguments with values of type `real`; the same every time.
 
-    For a model with effects: the records of its plays, mixed with calls of its settings. Status is read after each call
-    in some parts and after only some calls in others, since its bits must stay until they are read.
+    For a model with effects, these are records of its plays mixed with calls to its settings. Status is read after
+    each call in some parts and after only some calls in others, since its bits must stay until they are read.
     """
     plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
@@ -178,7 +178,7 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
     """From init to a reference, sometimes 0, held until a quiet drive stops; then a settle at that drive, often with
-    another drive committed right after it, and a further move. The drive at which it comes to rest shows any trace of
+    another drive committed right after it, and a further move. The drive at which the move ends shows any trace of
     the past that a settle leaves."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)

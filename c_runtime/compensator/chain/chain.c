@@ -1,4 +1,4 @@
-/* Operators of engine loop and of every model with effects: a chain of blocks from drive to
+/* Operators of the loop engine and of every model with effects: a chain of blocks from drive to
    displacement; without effects it is the plays alone. Applied drives pass forwards through all
    blocks, references backwards, so the memory depends only on drives that the actuator has seen.
    The model's own functions call its blocks:
@@ -18,7 +18,7 @@
    A step leaves the returned drive pending. The next step or settle absorbs this drive, or the one
    committed in its place.
 
-   Signals between the blocks have a type of their own; signals.c converts. */
+   Signals between the blocks have a type of their own; signals.c converts them. */
 #ifndef HYSTGEN_CHAIN_CHAIN_C
 #define HYSTGEN_CHAIN_CHAIN_C
 #include "compensator/chain/model.h"

@@ -1,4 +1,4 @@
-/* Operators of engine loop and of every model with effects: step and commit. Called by users. */
+/* Operators of the loop engine and every model with effects: step and commit. Called by users. */
 #ifndef HYSTGEN_CHAIN_CHAIN_CALLS_C
 #define HYSTGEN_CHAIN_CHAIN_CALLS_C
 #include "compensator/chain/model.h"

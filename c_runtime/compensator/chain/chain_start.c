@@ -1,4 +1,4 @@
-/* Operators of engine loop and of every model with effects: start memory. Called by users. */
+/* Operators of the loop engine and of every model with effects: start memory. Called by users. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/chain.c"
 #ifndef HYSTGEN_CONFIGURED

@@ -1,7 +1,7 @@
-/* Operators of a model with effects: plays of engine corners in fixed point, with the same bits as
-   those of engine loop. Up to the output `next`, along the move, plays continue from the last kink
-   found, which the inverse finds when it solves for their input. Searches are called where the
-   least stack is in use. Called by chain.c, chain_calls.c and chain_start.c. */
+/* Operators of a model with effects: the corner engine's plays in fixed point, with the same bits
+   as those of the loop engine. Up to the output `next`, along the move, plays continue from the
+   last kink found, which the inverse finds when it solves for their input. Searches are called
+   where the least stack is in use. Called by chain.c, chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FIXED_C
 #define HYSTGEN_CHAIN_CORNERS_FIXED_C
 #include "arithmetic/fixed.h"
@@ -36,7 +36,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return hystgen_level(self->here.output);
 }
 
-/* Moves the plays to an input between the kink and the next one. False for any other input. */
+/* Moves the plays to an input between the kink and the next. False for any other input. */
 HYSTGEN_APART bool hystgen_operator_move_on(hystgen_operator_t *self, hystgen_play_t w) {
     const int64_t moved = hystgen_gained(&hystgen_model_curve, &self->here, &self->kink, w);
     if (moved < 0 || self->kink.output + moved > self->next) {

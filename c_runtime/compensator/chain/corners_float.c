@@ -1,6 +1,6 @@
-/* Operators of a model with effects: plays of engine corners in floating point. The inverse moves
-   its plays to the solution. If another input arrives, they go on from there on the same line, or
-   the move is undone. Called by chain.c, chain_calls.c and chain_start.c. */
+/* Operators of a model with effects: the corner engine's plays in floating point. The inverse
+   moves its plays to the solution. If another input arrives, they go on from there on the same
+   line, or the move is undone. Called by chain.c, chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #define HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #ifndef HYSTGEN_CONFIGURED

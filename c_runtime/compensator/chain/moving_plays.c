@@ -15,7 +15,7 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 }
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
-/* Play i after the input of the plays has moved from x to w. Not inlined where that needs less
+/* Play i after the input of the plays has moved from x to w. Not inlined where this saves
    stack. */
 #ifdef HYSTGEN_HAS_MOVES_APART
 HYSTGEN_APART
@@ -42,7 +42,7 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
 /* Bent plays leave their places in the order of their thresholds; the contributions of those that
-   stay are kept as a sum (`staying`). Takes the plays that leave for w out of it. */
+   stay are kept as a sum (`staying`). Removes the plays that leave for w from this sum. */
 HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_play_t w) {
     unsigned int i;
     HYSTGEN_ROLLED
@@ -55,7 +55,7 @@ HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_pl
     }
 }
 
-/* Sum of the plays after their input has moved to w, for which those that leave are released;
+/* Sum of the plays after their input has moved to w, once those that leave for w are released;
    increases with w. */
 HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w + self->staying;
@@ -111,7 +111,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
 #ifdef HYSTGEN_HAS_DILATED_PLAYS
-    if (self->moving && w != self->play[0]) { /* thresholds do not grow with no move */
+    if (self->moving && w != self->play[0]) { /* thresholds grow only with a move */
 #else
     if (self->moving) {
 #endif
@@ -161,7 +161,7 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 #endif
 }
 #else
-/* Contribution of play i where it is. */
+/* Contribution of play i at its present place. */
 static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t *play,
                                             const hystgen_sum_t *bent) {
 #ifdef HYSTGEN_HAS_BENT_PLAYS
@@ -173,7 +173,7 @@ static inline hystgen_sum_t hystgen_staying(unsigned int i, const hystgen_play_t
 #endif
 }
 
-/* A sum of plays, with those from play i on where they are. */
+/* Adds the plays from i on, at their present places, to a sum of plays. */
 HYSTGEN_APART hystgen_sum_t hystgen_with_staying(unsigned int i, const hystgen_play_t *play,
                                                  const hystgen_sum_t *bent, hystgen_sum_t sum) {
     HYSTGEN_ROLLED

@@ -7,8 +7,8 @@
 #include "compensator/chain/signals.c"
 
 #ifdef HYSTGEN_FIXED
-/* The search goes on from the input tried last by the slope of the sum, as long as that leads to an
-   input inside the interval and it has not done so too often; else it halves the interval. Both
+/* The search goes on from the input tried last by the slope of the sum, as long as this leads to an
+   input inside the interval and has not been done too often; else it halves the interval. Both
    ends of the interval are known to be beyond the solution, so that a wrong slope costs tries and
    nothing else. */
 static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
@@ -41,7 +41,7 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
     }
 }
 
-/* The input to which the rate leads from the one tried last, at least one on and not beyond all. */
+/* The input to which the rate leads from the one tried last: at least 1 further, and in range. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
     const hystgen_sum_t input = search->input;
     const hystgen_sum_t left = search->sum - search->found;
@@ -161,8 +161,8 @@ static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slo
     return left * rate;
 }
 
-/* Goes on from try k to the next input: by the slope there, if that leads to an input inside the
-   interval and k is not too large; else to its middle. A wrong slope costs only tries. Returns
+/* Goes on from try k to the next input: by the slope there, if it leads to an input inside the
+   interval and k is not too large; else to the middle. A wrong slope costs only tries. Returns
    whether that input is the solution, by a last step along the slope there if plays start to move
    softly, else along the middle of all slopes. */
 #ifdef HYSTGEN_HAS_BENT_PLAYS
@@ -202,8 +202,8 @@ bool hystgen_inverse_solves(hystgen_attempt_t *at, unsigned int k) {
     return false;
 }
 
-/* Input of the plays at which their sum is h. The search begins where the slope of the last one
-   leads. */
+/* Input of the plays at which their sum is h. The search begins where the slope of the last
+   search leads. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
     hystgen_attempt_t at;
     unsigned int k;

@@ -1,4 +1,4 @@
-/* Operators of engine loop: plays that no effect changes. Called by chain.c and chain_calls.c. */
+/* Operators of the loop engine: plays unchanged by effects. Called by chain.c and chain_calls.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_C
 #define HYSTGEN_CHAIN_PLAYS_C
 #include "compensator/chain/model.h"

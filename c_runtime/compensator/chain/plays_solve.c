@@ -1,4 +1,4 @@
-/* Operators of engine loop: solves the plays for their input. Called by plays.c and relaxing.c. */
+/* Operators of the loop engine: solves plays for their input. Called by plays.c and relaxing.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #define HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #include "compensator/chain/model.h"

@@ -1,7 +1,7 @@
-/* Operators of engine loop and of every model with effects: bits of the plays' input below a drive
-   code. The inverse of some models refines its solution to these bits, since the inverse of a lag
-   would turn the rounding to a code into noise. Called by chain_calls.c and, for engine corners, by
-   corners_fixed.c. */
+/* Operators of the loop engine and of every model with effects: bits of the plays' input below a
+   drive code. The inverse of some models refines its solution to these bits, since the inverse of
+   a lag would turn the rounding to a code into noise. Called by chain_calls.c and, for the corner
+   engine, by corners_fixed.c. */
 #ifndef HYSTGEN_CHAIN_REFINED_INPUT_C
 #define HYSTGEN_CHAIN_REFINED_INPUT_C
 #include "compensator/chain/model.h"

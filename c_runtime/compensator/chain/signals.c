@@ -1,7 +1,7 @@
-/* Operators of engine loop and of every model with effects: signals between blocks. In floating
-   point they have the type of drives. In fixed point they are finer than codes; without effects,
-   drives remain codes up to the plays, and sums of the plays have HYSTGEN_FRACTION bits below an
-   output code. Called by chain.c, chain_calls.c and the plays. */
+/* Operators of the loop engine and of every model with effects: signals between blocks. In
+   floating point they have the type of drives. In fixed point they are finer than codes; without
+   effects, drives remain codes up to the plays, and sums of the plays have HYSTGEN_FRACTION bits
+   below an output code. Called by chain.c, chain_calls.c and the plays. */
 #ifndef HYSTGEN_CHAIN_SIGNALS_C
 #define HYSTGEN_CHAIN_SIGNALS_C
 #include "compensator/chain/model.h"
@@ -98,7 +98,7 @@ static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_fact
     return hystgen_short_times(x, share);
 }
 
-/* A play of threshold r after its input has moved to w. Their distance fits 32 bits. */
+/* A play of threshold r after its input has moved to w. Their distance fits in 32 bits. */
 static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
     const uint32_t way = (uint32_t)(w > play ? (hystgen_sum_t)w - play : (hystgen_sum_t)play - w);
     if ((hystgen_sum_t)way <= r) {

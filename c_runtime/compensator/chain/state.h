@@ -56,9 +56,9 @@ typedef struct {
 /* Numbers of the search for a lead, with fewer bits than signals. */
 typedef struct {
     int32_t left; /* distance that the lag is to gain beyond its target's move */
-    int32_t back; /* decrease of the lead in a step */
+    int32_t back; /* decrease in the lead per step */
     int32_t lead; /* lead before a cut */
-    int32_t room; /* largest cut of the lead */
+    int32_t room; /* largest cut in the lead */
 } hystgen_brake_t;
 #endif
 
@@ -137,11 +137,11 @@ typedef struct {
  */
 typedef struct {
     int64_t sum;
-    int64_t short_of; /* what the sum lacks at `low`, or 0 if `low` is below all inputs, */
-    int64_t over;     /* and what it has too much above `top`, or -1 */
+    int64_t short_of; /* shortfall of the sum at `low`, or 0 if `low` is below all inputs, */
+    int64_t over;     /* and its excess above `top`, or -1 */
     int64_t found;    /* sum at the input tried last, */
     int64_t last;     /* and at the one before */
-    uint32_t rate;    /* change of the input per change of the sum; kept from search to search */
+    uint32_t rate;    /* change in the input per unit change in the sum; kept for the next search */
     int32_t input;    /* the one tried last, */
     int32_t before;   /* and the one before */
     int32_t low;
@@ -162,15 +162,15 @@ typedef struct {
     hystgen_real_t input;
     hystgen_real_t asked;   /* sum of the plays that the solution has */
     hystgen_real_t sum;     /* their sum at the input tried, */
-    hystgen_real_t slope;   /* its change per change of the input, */
+    hystgen_real_t slope;   /* its change per unit change in the input, */
     hystgen_real_t steady;  /* and that in steady motion, in which plays follow in full; */
     hystgen_real_t reached; /* value that one of them reaches there, */
-    hystgen_real_t share;   /* and its share of a further change of the input */
+    hystgen_real_t share;   /* and its share of a further change in the input */
 } hystgen_attempt_t;
 
-/* What a search for the input of the plays begins with. */
+/* What a search for the input of the plays starts from. */
 typedef struct {
-    hystgen_real_t slope; /* change of their sum per change of their input, in steady motion */
+    hystgen_real_t slope; /* change in their sum per unit change in their input, in steady motion */
 } hystgen_search_t;
 #endif
 

@@ -21,8 +21,8 @@ typedef struct {
     uint8_t lift;
 } hystgen_number_t;
 
-/* A state of creep: its contribution at the next sample approaches weight times the input by `rate`
-   in each step. */
+/* A state of creep: its contribution at the next sample approaches weight times the input by a
+   share `rate` in each step. */
 typedef struct {
     hystgen_factor_t rate;
     hystgen_factor_t late; /* share of an input change that takes effect at once */
@@ -34,7 +34,7 @@ typedef struct {
 typedef struct {
     const hystgen_creep_term_t *term;
     hystgen_factor_t direct;        /* d */
-    hystgen_factor_t inverse_slope; /* 1 / (immediate change of y with h) */
+    hystgen_factor_t inverse_slope; /* 1 / (immediate change in y with h) */
     hystgen_factor_t inverse_rest;  /* h over y at rest */
     uint8_t bits;                   /* bits of the states below those of a signal, */
     uint8_t drop;                   /* and bits that products leave out */
@@ -50,7 +50,7 @@ typedef struct {
 /* Creep after the plays: y = slope h + X_1 + X_2 + ..., with the X of the previous sample. */
 typedef struct {
     const hystgen_creep_term_t *term;
-    hystgen_real_t slope; /* immediate change of y with h */
+    hystgen_real_t slope; /* immediate change in y with h */
     hystgen_real_t inverse_slope;
     hystgen_real_t rest; /* y over h at rest */
     hystgen_real_t inverse_rest;
@@ -92,7 +92,7 @@ typedef struct {
 } hystgen_lag_exact_table_t;
 
 /* Mode of the stage. Its two states are output minus input, and the rate of this difference; in a
-   step they change by shares of themselves (keep, swing), of each other (turn), and of a change of
+   step they change by shares of themselves (keep, swing), of each other (turn), and of a change in
    the input (lead, in fixed point late minus the change itself, and push). */
 typedef struct {
     hystgen_factor_t keep;
@@ -107,7 +107,7 @@ typedef struct {
 #ifdef HYSTGEN_FIXED
     uint8_t bits; /* bits of the states below those of a signal, */
     uint8_t drop; /* bits that products with states leave out, */
-    uint8_t lift; /* and bits that products with a change of the input leave out */
+    uint8_t lift; /* and bits that products with a change in the input leave out */
 #endif
 } hystgen_mode_table_t;
 
@@ -226,7 +226,7 @@ typedef struct {
     hystgen_factor_t inverse_give;
 } hystgen_stops_t;
 #else
-/* Drift over time: its rate, and half the change of the rate per second. */
+/* Drift over time: its rate, and half the change in the rate per second. */
 typedef struct {
     hystgen_real_t sample; /* duration in s of one sample, and of `carry` of them */
     hystgen_real_t block;

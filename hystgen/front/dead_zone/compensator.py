@@ -8,7 +8,7 @@ from hystgen.front.stage import StageTables
 
 @jit
 def dead_zone(t: StageTables, first: int, n: int, x: Scalar, inverse: int) -> Scalar:
-    """Evaluate the linear piece on which x lies; the inverse uses the forward map's tables, swapped."""
+    """Evaluate the linear piece that contains x; the inverse uses the forward map's tables, swapped."""
     d = t.stage_data
     breaks = first + n * inverse
     anchor_in = first + 2 * n + (n + 1) * inverse

@@ -130,7 +130,7 @@ class DeadZone:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x at which the map, which must rise over [low, high], has the value y; end pieces extend beyond."""
+        """The x at which the map, which must rise over [low, high], has the value y; the end pieces extend further."""
         ends, anchors, slopes = self._inverses(low, high)
         values = np.asarray(y, dtype=np.float64)
         piece = np.searchsorted(ends, values, side="right")

@@ -1,9 +1,9 @@
-"""tanh and atanh with the bits of the C kernels `c_runtime/front/{tanh,atanh}_{f32,f64}.c`.
+"""tanh and atanh with the same bits as the C kernels `c_runtime/front/{tanh,atanh}_{f32,f64}.c`.
 
-They do the same operations in the same order on numbers of the same format, float32 or float64. Every constant comes
-from a table in that format, because a Python float next to a float32 would widen it once numba compiles the function.
-They run unchanged on numpy scalars (`tanh.py_func`), compiled, and, with the tables of `SCALAR`, on Python floats,
-which is several times as fast as on numpy scalars. Comments in the C files describe the method; the coefficients come
+They perform the same operations in the same order on numbers of the same format, float32 or float64. Every constant
+comes from a table in that format, since a Python float next to a float32 would widen it in compiled functions.
+They run unchanged on numpy scalars (`tanh.py_func`), compiled, and, with the tables in `SCALAR`, on Python floats,
+which is several times faster than on numpy scalars. Comments in the C files describe the method; the coefficients come
 from `c_runtime/front/fit_coefficients.py`.
 """
 
@@ -37,7 +37,7 @@ ATANH_MAX_ULP = {"float32": 1.07, "float64": 1.48}
 
 
 class TanhTables(NamedTuple):
-    """Constants of `tanh` in one format, one-dimensional arrays of it."""
+    """Constants of `tanh`: one-dimensional arrays in one format."""
 
     bound: Reals  # tanh x is x below the first, 1 from the second on
     one: Reals
@@ -48,7 +48,7 @@ class TanhTables(NamedTuple):
 
 
 class AtanhTables(NamedTuple):
-    """Constants of `atanh` in one format, one-dimensional arrays of it."""
+    """Constants of `atanh`: one-dimensional arrays in one format."""
 
     bound: Reals  # 1/2 and the largest number below 1
     one: Reals
@@ -63,7 +63,7 @@ class AtanhTables(NamedTuple):
 
 @jit
 def tanh(x: Scalar, t: TanhTables) -> Scalar:
-    """Hyperbolic tangent of one number, with the bits of `hystgen_tanh`.
+    """Hyperbolic tangent of one number, with the same bits as `hystgen_tanh`.
 
     `x`: numpy scalar of the tables' format, no unit; returns the same format. Infinities give +-1, NaN gives 1;
     raises nothing. Largest error: `TANH_MAX_ULP`.
@@ -96,7 +96,7 @@ def tanh(x: Scalar, t: TanhTables) -> Scalar:
 
 @jit
 def atanh(x: Scalar, t: AtanhTables) -> Scalar:
-    """Inverse hyperbolic tangent of one number, with the bits of `hystgen_atanh`.
+    """Inverse hyperbolic tangent of one number, with the same bits as `hystgen_atanh`.
 
     `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Larger |x| and NaN are treated
     as the largest number below 1; raises nothing. Largest error: `ATANH_MAX_ULP`.
@@ -287,4 +287,4 @@ ATANH_TABLES = {"float32": _ATANH_FLOAT32, "float64": _ATANH_FLOAT64}
 """Constants of `atanh` in each format; read-only arrays."""
 
 SCALAR = TanhTables(*(x.tolist() for x in _TANH_FLOAT64)), AtanhTables(*(x.tolist() for x in _ATANH_FLOAT64))
-"""Float64 constants of both as Python floats, which give the same bits as numpy scalars."""
+"""Float64 constants for both as Python floats, which give the same bits as numpy scalars."""

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 a06ef7a6a81d3a8c726f856b3a0e705d208e20d1c013b90bd338f06ce3a037b4, without this line
+ * Text: sha256 1c206daecb32acceb196e9fc6797d07038291b05fc87d06b3ae0119835519f7e, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -326,14 +326,8 @@ static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     return inside;
 }
 
-bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
-    /* The actuator has seen the pending drive. */
-    if (self->has_pending) {
-        bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, self->pending));
-        self->has_pending = false;
-    }
-    /* The next drive, for reference u; the memory is up to date. `bits`: status of the
-       reference. */
+/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
+static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
     bent_real_t level = u;
     unsigned int bits = 0;
     if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
@@ -354,6 +348,17 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
         bent_loop_output(&bent_model_tables, self->play), h);
     const bent_real_t v = bent_front_inverse(w);
     return bent_inverse_answer(self, bent_inverse_limited(self, v));
+}
+
+bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
+    /* The actuator has seen the pending drive. */
+    if (self->has_pending) {
+        /* Passes drive v through the drive side and moves the plays. */
+        const bent_real_t v = self->pending;
+        bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
+        self->has_pending = false;
+    }
+    return bent_inverse_next(self, u);
 }
 
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 33d6b7ffb2ef95fbfac2c4ecdd6675ce3542ef808b823d50d71b2caad9ffeda3, without this line
+ * Text: sha256 f7b1f00f4b3a81822172945e26a9d4725e3d87a893abe7ac7aeeee3ae9b484ee, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -322,7 +322,7 @@ static inline int64_t curved_part_of(int32_t y, int32_t h) {
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
    Arguments: the starts of the pieces, the left shifts that scale their lengths to 2^31, and their
-   coefficients from degree 0, of which all but c_0 fit a word together. */
+   coefficients from degree 0; all but c_0 together fit in a word. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
         unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
