@@ -11,7 +11,7 @@ jumps to all positions; neighbours of the most expensive of these; and the same 
 before the jump (`interrupted`). A NaN or infinity right after a commit, which repeats the answer before the commit, is
 counted separately. So is a drive range that begins at 0, where the plays rest, as with most piezo drives: references
 may then need a drive below the range, and some fixed sequences in which rounding decides that are run as well. All
-answers counted are compared with the bit reference.
+answers counted are compared with the bit-exact reference.
 
 Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 if a goal is missed. A run over all plays,
 cores and arithmetics takes hours: `--parts` joins the tables of shorter runs.

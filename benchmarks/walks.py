@@ -4,7 +4,7 @@
 
 For each run it prints the number of files of the package in which a function was called, and of doorways, pairs of
 files of which one calls the other; with -v also the files. Imports, a first run, which fills caches, and other
-processes do not count. A profiler sees no compiled functions, so the bit reference runs as plain Python.
+processes do not count. A profiler sees no compiled functions, so the bit-exact reference runs as plain Python.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import hystgen
 
 ROOT = Path(hystgen.__file__).parent
 EXAMPLES = Path(__file__).parents[1] / "examples"
-IN_PYTHON = "a sample through the bit reference"
+IN_PYTHON = "a sample through the bit-exact reference"
 MODEL = """\
 hystgen: 1
 name: stage_x

@@ -258,7 +258,7 @@ class Model:
         self, operator: str = "forward", arithmetic: str | None = None, engine: str | None = None, clamp: bool = False
     ) -> Session:
         """An instance of an operator that keeps its memory from record to record."""
-        self.need_static("a sample-by-sample operator" if arithmetic is None else "the bit reference")
+        self.need_static("a sample-by-sample operator" if arithmetic is None else "the bit-exact reference")
         if arithmetic is not None:
             check_arithmetic(arithmetic)
             chosen = self.engine(engine, arithmetic=arithmetic)
@@ -323,8 +323,8 @@ class Model:
         record = replace(self.run(_held("x", samples, 0.0)[0], t, extra), v=samples)
         if np.max(np.abs(record.steps - seconds), initial=0.0) > EVEN * seconds:
             raise EffectsError(
-                f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
-                "in double precision, which takes any sample times"
+                f"the bit-exact reference takes a sample every sample_time = {seconds:g} s; resample the record, or "
+                "simulate in double precision, which takes any sample times"
             )
         began = float(record.t[0])
         for effect in self.effects:

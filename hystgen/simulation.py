@@ -77,7 +77,7 @@ def _emulated(
 ) -> Answers:
     """Output of the bit-exact reference for a model with effects, which takes a single record, and remarks."""
     if len(records) > 1:
-        raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
+        raise EffectsError("the bit-exact reference of a model with effects takes one record; simulate them one by one")
     (record,) = records
     signal = record.columns()["v" if operator == "forward" else "u"]
     run = model.answers if operator == "forward" else model.inverse().answers

@@ -1,4 +1,4 @@
-"""Fuzzing of the emitted C with libFuzzer, and replay of the inputs it kept against the bit reference."""
+"""Fuzzing of the emitted C with libFuzzer, and replay of the inputs it kept against the bit-exact reference."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Target:
         return done.stderr
 
     def replay(self, corpus: Path) -> int:
-        """Compare every input of `corpus` with the bit reference. Returns the number of calls; raises FuzzError."""
+        """Compare each input of `corpus` with the bit-exact reference. Returns the number of calls. Raises FuzzError."""
         files = sorted(corpus.iterdir())
         done, inputs = self._logged(*files)
         if done.returncode:

@@ -95,7 +95,7 @@ def test_the_drive_stays_in_range_and_is_exact_wherever_it_is_not_limited(name: 
 
 @pytest.mark.parametrize("name", ACTUATORS)
 def test_it_limits_as_the_c_does(name: str) -> None:
-    """It agrees with the bit reference in float64, which has the bits of the C."""
+    """It agrees with the bit-exact reference in float64, which has the bits of the C."""
     one = model(ACTUATORS[name][0]).inverse()
     u = reference()
     u[[50, 51, 200]] = np.nan, np.inf, -np.inf

@@ -813,7 +813,7 @@ def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     assert int(suite.get("failures", 0)) == len(suite.findall(".//failure")) >= 2
     assert "bits equal" not in result.stdout
 
-    # The first sample at which the bit reference itself answers differently with that number
+    # The first sample at which the bit-exact reference itself answers differently with that number
     model = hystgen.load("stage.yaml")
     numbers, other = (tables.build(model.cascade, "float32", "corners") for _ in range(2))
     other.inverse.gain[-2] = up(other.inverse.gain[-2])  # the last one belongs to a play that never follows

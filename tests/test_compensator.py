@@ -247,7 +247,7 @@ emit: {compensation: {%s}}
     ],
 )  # fmt: skip
 def test_the_reference_is_read_as_the_c_reads_it(options: str, model: Callable[[str], hystgen.Model]) -> None:
-    """Double precision against the bit reference in float64, whose rounding stays below 1e-11 with a lead of 250."""
+    """Double precision against the bit-exact reference in float64, whose rounding is below 1e-11 with a lead of 250."""
     one = model(RUNG % (options if "noise_gain" in options else f"{options}, noise_gain: 10000"))
     rng = np.random.default_rng(0)
     u = np.concatenate([np.full(20, 7.0), 7.0 + np.cumsum(0.02 * rng.normal(size=180))])

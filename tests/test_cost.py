@@ -1,4 +1,4 @@
-"""The operations that the banner promises, counted by running the bit reference in Python on counting numbers."""
+"""The operations that the banner promises, counted by running the bit-exact reference in Python on counting numbers."""
 
 from __future__ import annotations
 

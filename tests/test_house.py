@@ -219,13 +219,13 @@ def test_the_package_itself_imports_nothing() -> None:
     [
         ("a recording's column v to weights", 29),
         ("a weight to its digit in float32 C", 28),  # 3 of these files explain the C, one declares memory by name
-        ("a sample through the bit reference", 6),  # one of these files runs the calls of every engine
+        ("a sample through the bit-exact reference", 6),  # one of these files runs the calls of every engine
         ("a recording to a named effect", 68),  # 8 of these files put the inverse in front of the plain model
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:
     """A reader has to follow a number through few files of the package."""
-    plain = {**os.environ, "NUMBA_DISABLE_JIT": str(int("bit reference" in walk))}
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": str(int("bit-exact reference" in walk))}
     script = Path(__file__).parents[1] / "benchmarks" / "walks.py"
     run = subprocess.run([sys.executable, script, "--one", walk], capture_output=True, text=True, check=True, env=plain)
     files = int(run.stdout.removeprefix(walk).split()[0])

@@ -88,8 +88,8 @@ def test_without_numba_effects_give_the_same_bits(
 
 
 def same_bits(tables: Any, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Check that the bit reference gives the same bits compiled and as Python over the records of `verify`, and that
-    numpy does not warn."""
+    """Check that the bit-exact reference gives the same bits compiled and as Python over the records of `verify`, and
+    that numpy does not warn."""
     found = []
     monkeypatch.setattr(jitting, "SHORT", 0)
     for has_numba in (True, False):

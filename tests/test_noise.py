@@ -1,4 +1,4 @@
-"""The noise gain of the emitted inverse and the averages that limit it, measured on the bit reference itself."""
+"""The noise gain of the emitted inverse and the averages that limit it, measured on the bit-exact reference itself."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def test_declared_dependencies_suffice_for_every_module(python: Path, tmp_path: 
 
 @pytest.mark.thorough
 def test_without_extras_models_are_emitted_verified_shown_and_run(python: Path, tmp_path: Path) -> None:
-    """The other tests of this environment emit and show; the bit reference computes without numba."""
+    """The other tests of this environment emit and show; the bit-exact reference computes without numba."""
     (tmp_path / "mixed.yaml").write_text(FILES["mixed"])
     program = python.with_name("hystgen")
     for arithmetic in ("float32", "q15"):

@@ -1,1 +1,1 @@
-"""The compensator in one arithmetic: tables, bounds and the bit reference of the emitted C."""
+"""The compensator in one arithmetic: tables, bounds and the bit-exact reference of the emitted C."""

@@ -1,4 +1,4 @@
-"""The constants of one model in one arithmetic, as the bit reference and the C text use them, and clamping."""
+"""The constants of one model in one arithmetic, as the bit-exact reference and the C text use them, and clamping."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it, or the same
+"""The bit-exact reference, which repeats the emitted C operation by operation, and sessions, which run it, or the same
 operator in double precision, over sampled signals."""
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
-    """The functions of one operator in the bit reference, for the arithmetic and engine of the tables."""
+    """The functions of one operator in the bit-exact reference, for the arithmetic and engine of the tables."""
     found = _engines(t)
     if isinstance(t, Tables | FixedTables):
         return (found.loop if t.engine == LOOP else found.corners[t.has_front])[inverse]
@@ -120,7 +120,7 @@ def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Answers and status of the bit reference for calls `call` with arguments `x`, from the start memory on."""
+    """Answers and status of the bit-exact reference for calls `call` with arguments `x`, from the start memory on."""
     code, state = operations(t, inverse), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -135,8 +135,8 @@ class Session:
     """One instance of an operator, run over consecutive records.
 
     `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
-    `clamp` is set; with it, it is the bit reference of the emitted C, which clamps. `lsb`: drive and output units per
-    code in fixed point, None for the finest. Raises NotInvertibleError and FormatError.
+    `clamp` is set; with it, it is the bit-exact reference of the emitted C, which clamps. `lsb`: drive and output units
+    per code in fixed point, None for the finest. Raises NotInvertibleError and FormatError.
     """
 
     def __init__(

@@ -55,7 +55,7 @@ def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[N
     """Answers (N,) of a session, and remarks on the samples.
 
     `moved`: for an inverse in double precision, a forward session with the same memory, to count the references that
-    the drives miss by more than rounding. The bit reference counts by the status bits of the C.
+    the drives miss by more than rounding. The bit-exact reference counts by the status bits of the C.
     """
     answers, status = session.run(x)
     signal = arguments.signal("x", x)

@@ -1,6 +1,6 @@
 """The constants of a model's kernels in one arithmetic.
 
-The bit reference and the C text both take an operator's constants from here.
+The bit-exact reference and the C text both take an operator's constants from here.
 """
 
 from __future__ import annotations

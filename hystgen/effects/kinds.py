@@ -122,7 +122,7 @@ class OwnBlock:
     absorb: Callable[..., Any]
 
     def compiled(self, verb: str, arithmetic: Answer) -> Jit[..., Scalar]:
-        """A function for the bit reference, with the product of an arithmetic replacing `product`."""
+        """A function for the bit-exact reference, with the product of an arithmetic replacing `product`."""
         function = getattr(self, verb)
         names = function.__globals__
         replaced = {name: arithmetic for name, value in names.items() if value is product}

@@ -6,8 +6,8 @@
     def absorb(t, s, x): ...    the input is x at this sample; returns the output
 
 The functions index two arrays: `t`, the block's parameters, and `s`, its memory. They run unchanged in double
-precision, and compiled as the bit reference of the C in each arithmetic, so they use only +, - and `product(t[..],
-..)`: a literal would not have the precision of the C.
+precision, and compiled as the bit-exact reference of the C in each arithmetic, so they use only +, - and
+`product(t[..], ..)`: a literal would not have the precision of the C.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def problem(effect: type[Effect]) -> str:
 
 @functools.cache
 def check(effect: type[Effect]) -> None:
-    """Raise EffectsError, a line `FILE:LINE: what; do` per fault, if a block cannot be the bit reference of its C."""
+    """Raise EffectsError, a line `FILE:LINE: what; do` per fault, if a block cannot be the reference of its C."""
     assert effect.block is not None
     if wrong := problem(effect):
         raise EffectsError(f"the effect {_name(effect)} {wrong}")

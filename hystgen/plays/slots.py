@@ -1,4 +1,4 @@
-"""Numbers that the bit reference shares with the C: limits, status bits and calls."""
+"""Numbers that the bit-exact reference shares with the C: limits, status bits and calls."""
 
 from __future__ import annotations
 

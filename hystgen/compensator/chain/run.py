@@ -1,4 +1,4 @@
-"""Run the bit reference of a model with effects over a whole record."""
+"""Run the bit-exact reference of a model with effects over a whole record."""
 
 from __future__ import annotations
 

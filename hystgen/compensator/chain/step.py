@@ -1,4 +1,4 @@
-"""One step of a model with effects, and its calls: the bit reference of `chain/chain.c` in `c_runtime/compensator/`.
+"""One step of a model with effects, and its calls: the bit-exact reference of `c_runtime/compensator/chain/chain.c`.
 
 Blocks in front of the plays (lag) and behind them (creep, gain) absorb the applied drive forwards and are solved
 backwards; the plays between them are those of engine loop or corners. The functions of the blocks, and the conversion
