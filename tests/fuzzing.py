@@ -80,7 +80,7 @@ class Target:
         return done.stderr
 
     def replay(self, corpus: Path) -> int:
-        """Compare each input of `corpus` with the bit-exact reference. Returns the number of calls. Raises FuzzError."""
+        """Compare each input of `corpus` with the reference. Returns the number of calls. Raises FuzzError."""
         files = sorted(corpus.iterdir())
         done, inputs = self._logged(*files)
         if done.returncode:
