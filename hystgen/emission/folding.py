@@ -404,9 +404,9 @@ class _Folding:
 
 
 def _declared(function: Function) -> dict[str, str]:
-    """The types of a function's parameters and constants."""
-    constants = re.finditer(r"^ *const (\w+) (\w+) =", function.body, re.MULTILINE)
-    return dict(zip(function.names, function.types, strict=True)) | {each[2]: each[1] for each in constants}
+    """The types of a function's parameters and of local variables with a first value."""
+    local = re.finditer(r"^ *(?:const )?(\w+) (\w+) =", function.body, re.MULTILINE)
+    return dict(zip(function.names, function.types, strict=True)) | {each[2]: each[1] for each in local}
 
 
 _ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 1c206daecb32acceb196e9fc6797d07038291b05fc87d06b3ae0119835519f7e, without this line
+ * Text: sha256 341dc240d622196b8f9653347d99e3c941e01a8ccd4b6986a814c58c2eb9434a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -310,12 +310,6 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     return answer;
 }
 
-/* Takes the next reference, which lies within its range. Returns the target of the output side at
-   this sample. */
-static inline bent_real_t bent_inverse_put(bent_real_t level) {
-    return level - BENT_OFFSET;
-}
-
 /* The drive v within its limits. */
 static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     const bent_real_t inside = bent_clamp_drive(v);
@@ -343,7 +337,7 @@ static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u)
         return bent_inverse_answer(self, self->answer);
     }
     self->bits = bits;
-    const bent_real_t h = bent_inverse_put(level);
+    const bent_real_t h = level - BENT_OFFSET;
     const bent_real_t w = bent_loop_solve(&bent_model_tables, self->play,
         bent_loop_output(&bent_model_tables, self->play), h);
     const bent_real_t v = bent_front_inverse(w);
