@@ -201,10 +201,11 @@ HYSTGEN_SWIFT bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays
                                          hystgen_real_t input) {
     const hystgen_real_t way = hystgen_along(m, input - m->from_input);
     const hystgen_segment_t *s = &t->segment[m->here.k + 1u];
-    unsigned int more; /* plays that begin to follow */
-    for (more = 1; hystgen_order(way) > hystgen_order(s[1].way); ++more) {
+    unsigned int more = 1; /* plays that begin to follow */
+    while (hystgen_order(way) > hystgen_order(s[1].way)) {
         ++s;
-        if (more == 7u) { /* from here on, bisection is faster */
+        ++more;
+        if (more == 8u) { /* from here on, bisection is faster */
             return false;
         }
     }

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ac6e5b48425d48192977f5e283562c8e045055b4d0f2ea635916ad5ad38fafa2, without this line
+ * Text: sha256 6d03a53e5a098aa8f09e1cae8ee31537c640549abfdae51441799c0fb2b6d4b9, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -266,10 +266,11 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
 PLAIN_SWIFT bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
     const plain_real_t way = plain_along(m, input - m->from_input);
     const plain_segment_t *s = &t->segment[m->here.k + 1u];
-    unsigned int more; /* plays that begin to follow */
-    for (more = 1; plain_order(way) > plain_order(s[1].way); ++more) {
+    unsigned int more = 1; /* plays that begin to follow */
+    while (plain_order(way) > plain_order(s[1].way)) {
         ++s;
-        if (more == 7u) { /* from here on, bisection is faster */
+        ++more;
+        if (more == 8u) { /* from here on, bisection is faster */
             return false;
         }
     }

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 7eeb87f5ea0c0611069e62179fac9955f58d3a325042013c038103e0c11e2eba, without this line
+ * Text: sha256 b51a6ed269ff84e5549d809c1493e4afeaf52b36207bb673ee95f65a8f22ed31, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -663,10 +663,11 @@ TWO_BRANCHES_SWIFT bool two_branches_move_in_block(const two_branches_curve_t *t
         two_branches_plays_t *m, two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from_input);
     const two_branches_segment_t *s = &t->segment[m->here.k + 1u];
-    unsigned int more; /* plays that begin to follow */
-    for (more = 1; two_branches_order(way) > two_branches_order(s[1].way); ++more) {
+    unsigned int more = 1; /* plays that begin to follow */
+    while (two_branches_order(way) > two_branches_order(s[1].way)) {
         ++s;
-        if (more == 7u) { /* from here on, bisection is faster */
+        ++more;
+        if (more == 8u) { /* from here on, bisection is faster */
             return false;
         }
     }
