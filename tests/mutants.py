@@ -89,20 +89,20 @@ KILLED = (
     ),
     Mutant(
         "a block beyond the limit is passed", FLOAT,
-        "s->reach > room ? HYSTGEN_REAL_MAX",
-        "s->reach > room + room ? HYSTGEN_REAL_MAX",
+        "hystgen_above(s->reach, room) ?",
+        "hystgen_above(s->reach, room + room) ?",
         "above", "float32",
     ),
     Mutant(
         "the limit is met late", FLOAT,
-        "t->segment[c->top].reach > t->inside[on] - start;",
-        "t->segment[c->top].reach > 2 * (t->inside[on] - start);",
+        "hystgen_above(t->segment[c->top].reach, t->inside[on] - start);",
+        "hystgen_above(t->segment[c->top].reach, 2 * (t->inside[on] - start));",
         "above", "float32",
     ),
     Mutant(
         "a move that stops is looked for among ways alone", FLOAT,
-        "reach > s[middle].reach",
-        "reach > s[middle].way",
+        "> hystgen_order(middle->reach)",
+        "> hystgen_order(middle->way)",
         "above", "float32",
     ),
     Mutant(
@@ -125,8 +125,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow", INVERSE,
-        "    } else if (m->here.k == 0) {\n        same =",
-        "    } else {\n        same =",
+        ": m->here.k == 0 &&",
+        ":",
         "plain", "float32",
     ),
     Mutant(
@@ -137,14 +137,14 @@ KILLED = (
     ),
     Mutant(
         "a line leads back beyond the range", FLOAT,
-        "k == 0 && from <= t->range[other] ?",
+        "k == 0 && !hystgen_above(from, t->range[other]) ?",
         "k == 0 ?",
         "outside", "float32",
     ),
     Mutant(
         "no number behind a commit keeps the commit", INVERSE,
-        "if (self->stepped && self->committed) {",
-        "if (self->stepped && !self->committed) {",
+        "HYSTGEN_STATUS_HELD && self->stepped && self->committed) {",
+        "HYSTGEN_STATUS_HELD && self->stepped && !self->committed) {",
         "plain", "float32",
     ),
     Mutant(
@@ -167,8 +167,8 @@ KILLED = (
     ),
     Mutant(
         "a corner is passed only beyond it", FLOAT,
-        "if (kept > 0 && x >= corner[kept].pass[on]) {",
-        "if (kept > 0 && x > corner[kept].pass[on]) {",
+        "if (kept > 0 && !hystgen_above(corner[kept].pass[on], x)) {",
+        "if (kept > 0 && hystgen_above(x, corner[kept].pass[on])) {",
         "plain", "float32",
     ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),

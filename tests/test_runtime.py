@@ -31,6 +31,9 @@ pytestmark = pytest.mark.thorough
 
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 
+SOFT = "-D__SOFTFP__"
+"""As on a core without FPU, where engine corners compares floats by their bits."""
+
 DRIVER = """
 #include "hystgen_runtime.h"
 void loop(const double *r, const double *p, const double *lift, const double *inverse, unsigned short n, int invert,
@@ -71,7 +74,7 @@ void corners(const double *segment, double falling, double rising, unsigned shor
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize(
-    "real", [[], ["-DHYSTGEN_REAL_IS_DOUBLE"], ["-DHYSTGEN_FIXED"]], ids=["float", "double", "fixed"]
+    "real", [[], [SOFT], ["-DHYSTGEN_REAL_IS_DOUBLE"], ["-DHYSTGEN_FIXED"]], ids=["float", "soft", "double", "fixed"]
 )
 @pytest.mark.parametrize("dialect", ["-std=c99", "-std=c11", "-x c++ -std=c++17"])
 def test_compiles_clean_without_undefined_symbols(compiler: str, real: list[str], dialect: str, tmp_path: Path) -> None:
@@ -154,7 +157,8 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
 
 @pytest.mark.parametrize("unit", units.UNITS, ids=map("-".join, units.UNITS))
 def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str, str, str], tmp_path: Path) -> None:
-    """gcc and clang compile the files without warnings, with nothing renamed and nothing left out."""
+    """gcc and clang compile the files without warnings, with nothing renamed and nothing left out; engine corners in
+    float32 also as for a core without FPU."""
     name, arithmetic, engine = unit
     source = units.write(tmp_path, *unit)
     flags = ["-std=c99", "-O2", "-fPIC", "-shared", *C_WARNINGS, *units.FLAGS, *units.DEFINES[arithmetic]]
@@ -166,9 +170,10 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
         _, call, x = next(c for c in signals.suite(numbers, real, op == "inverse", 2000) if c[0] == record)
         values = x.astype(real).astype(numbers.threshold.dtype)
         records[op] = call, values, reference.answers(numbers, op == "inverse", call, values)
-    for compiler in ("gcc", "clang"):
-        binary = tmp_path / f"{compiler}.so"
-        command = [compiler, *flags, *units.INCLUDES, str(source), "-o", str(binary)]
+    soft = [("gcc", SOFT)] * (arithmetic == "float32" and engine == "corners")
+    for number_of_build, compiler in enumerate((("gcc",), ("clang",), *soft)):
+        binary = tmp_path / f"{number_of_build}.so"
+        command = [*compiler, *flags, *units.INCLUDES, str(source), "-o", str(binary)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         ffi = cffi.FFI()
@@ -197,6 +202,23 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
                 status[i] = 0 if call[i] & slots.OP_UNREAD else read(self)
             assert found.tobytes() == expected.astype(real).tobytes(), (compiler, op)
             assert status.tolist() == bits.tolist(), (compiler, op)
+
+
+def test_bits_compare_as_their_numbers(tmp_path: Path) -> None:
+    """On a core without FPU; NaNs lie beyond all numbers, each on the side of its sign."""
+    source = tmp_path / "above.c"
+    text = "int above(float a, float b);\nint above(float a, float b) { return hystgen_above(a, b); }\n"
+    source.write_text(f'#include "arithmetic/numbers.h"\n{text}')
+    command = ["gcc", "-std=c99", "-O2", "-fPIC", "-shared", *C_WARNINGS, SOFT, f"-I{RUNTIME}"]
+    subprocess.run([*command, source, "-o", tmp_path / "above.so"], check=True)
+    ffi = cffi.FFI()
+    ffi.cdef("int above(float, float);")
+    above = ffi.dlopen(str(tmp_path / "above.so")).above
+    sizes = np.array([0, 1, 2, 0x7FFFFF, 0x800000, 0x3F7FFFFF, 0x3F800000, 0x7F7FFFFF, 0x7F800000], dtype=np.uint32)
+    numbers = [float(x) for x in np.concatenate([sizes, sizes | np.uint32(1 << 31)]).view(np.float32)]
+    assert [[bool(above(a, b)) for b in numbers] for a in numbers] == [[a > b for b in numbers] for a in numbers]
+    assert all(above(np.nan, x) and above(x, -np.nan) for x in numbers)
+    assert not any(above(x, np.nan) or above(-np.nan, x) for x in numbers)
 
 
 def test_every_line_is_in_a_unit() -> None:

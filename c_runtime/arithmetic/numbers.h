@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "arithmetic/build.h"
+#include "arithmetic/storage.h"
 #include "arithmetic/soft_float.h"
 
 /* Types of a model's numbers: one type for all in floating point, integers of the necessary widths
@@ -69,7 +70,6 @@ typedef hystgen_real_t hystgen_factor_t;
 
 /* Storage classes of functions in emitted files: a model's own copies of kernels are static; some
    of them are not inlined, to save stack. */
-#include "arithmetic/storage.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL
 #define HYSTGEN_FIXED_KERNEL

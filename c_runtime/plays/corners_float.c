@@ -13,11 +13,6 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* The direction of a rising or falling move. */
-static inline hystgen_direction_t hystgen_direction(bool rising) {
-    return rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
-}
-
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x) {
 #ifdef HYSTGEN_SOFT_FLOAT
@@ -46,8 +41,8 @@ HYSTGEN_API void hystgen_take_back(hystgen_plays_t *m, const hystgen_place_t *to
 HYSTGEN_SWIFT void hystgen_reverse(const hystgen_curve_t *t, hystgen_plays_t *m,
                                    hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
-    const hystgen_direction_t on = hystgen_direction(m->here.rising);
-    const hystgen_direction_t back = hystgen_direction(!m->here.rising);
+    const hystgen_direction_t on = m->here.rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
+    const hystgen_direction_t back = m->here.rising ? HYSTGEN_FALLING : HYSTGEN_RISING;
     if (m->here.k > 0) {
         const hystgen_real_t x = hystgen_along(m, m->here.input);
         hystgen_corner_t *c = &corner[m->here.depth];
@@ -55,7 +50,7 @@ HYSTGEN_SWIFT void hystgen_reverse(const hystgen_curve_t *t, hystgen_plays_t *m,
         c->pass[on] = x;
 #ifndef HYSTGEN_HAS_NO_LIMIT
         const hystgen_real_t room = t->limit[back] + hystgen_along(m, m->here.output);
-        c->pass[back] = s->reach > room ? HYSTGEN_REAL_MAX : s->way - x;
+        c->pass[back] = hystgen_above(s->reach, room) ? HYSTGEN_REAL_MAX : s->way - x;
 #else
         c->pass[back] = s->way - x;
 #endif
@@ -75,16 +70,17 @@ HYSTGEN_APART void hystgen_reverse_apart(const hystgen_curve_t *t, hystgen_plays
     hystgen_reverse(t, m, corner);
 }
 
-/* Last of segments k .. end - 1 that begins before a way and, if `both`, a reach; k always does. */
-static inline unsigned int hystgen_find_segment(const hystgen_segment_t *s, unsigned int k,
-                                                unsigned int end, hystgen_real_t way,
+/* The last of `left` segments from k on that begins before a way and, if `both`, a reach. */
+static inline unsigned int hystgen_find_segment(const hystgen_curve_t *t, unsigned int k,
+                                                unsigned int left, hystgen_real_t way,
                                                 hystgen_real_t reach, bool both) {
-    unsigned int middle = (k + end) / 2;
-    while (middle > k) { /* bisect: segment k begins before them, segment `end` does not */
-        const bool before = (!both || reach > s[middle].reach) && way > s[middle].way;
-        k = before ? middle : k;
-        end = before ? end : middle;
-        middle = (k + end) / 2;
+    unsigned int half = left / 2;
+    while (half > 0) { /* bisect */
+        const hystgen_segment_t *middle = &t->segment[k + half];
+        const bool reached = !both || hystgen_order(reach) > hystgen_order(middle->reach);
+        k = reached && hystgen_order(way) > hystgen_order(middle->way) ? k + half : k;
+        left -= half;
+        half = left / 2;
     }
     return k;
 }
@@ -94,8 +90,8 @@ static inline unsigned int hystgen_find_segment(const hystgen_segment_t *s, unsi
 HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_t *m,
                                         const hystgen_corner_t *c, hystgen_real_t input,
                                         hystgen_real_t output, bool stop) {
-    const hystgen_direction_t on = hystgen_direction(m->here.rising);
-    const hystgen_direction_t other = hystgen_direction(!m->here.rising);
+    const hystgen_direction_t on = m->here.rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
+    const hystgen_direction_t other = m->here.rising ? HYSTGEN_FALLING : HYSTGEN_RISING;
     const hystgen_real_t from = c->pass[other];
     hystgen_real_t cap = c->pass[on];
     hystgen_real_t next = cap;
@@ -105,10 +101,10 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
     bool limits = stop;  /* the plays may stop in this block */
     if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
 #ifndef HYSTGEN_HAS_NO_LIMIT
-        limits = limits || t->segment[c->top].reach > t->inside[on] - start;
+        limits = stop || hystgen_above(t->segment[c->top].reach, t->inside[on] - start);
 #endif
-        k = limits ? hystgen_find_segment(t->segment, k, c->top, input + from, output - start, true)
-                   : hystgen_find_segment(t->segment, k, c->top, input + from, 0, false);
+        k = limits ? hystgen_find_segment(t, k, c->top - k, input + from, output - start, true)
+                   : hystgen_find_segment(t, k, c->top - k, input + from, 0, false);
         begin = t->segment[k].way - from;
         start = start + t->segment[k].reach;
     }
@@ -119,12 +115,12 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
     m->here.k = (uint_least16_t)k;
     const hystgen_real_t y = stop ? output : start + (input - begin) * s->gain;
 #ifndef HYSTGEN_HAS_NO_LIMIT
-    if (stop || y > output) {
+    if (stop || hystgen_above(y, output)) {
 #else
     if (limits) {
 #endif
         const hystgen_real_t x = begin + (output - start) * s->slope;
-        m->here.input = hystgen_along(m, x < input ? x : input);
+        m->here.input = hystgen_along(m, hystgen_above(input, x) ? x : input);
         m->here.output = hystgen_along(m, output);
         hystgen_forget_line(m);
         return true;
@@ -135,50 +131,43 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
         next = s[1].way - from;
         cap = c->rose == HYSTGEN_BOTTOM ? next : cap; /* all plays below its top follow */
 #ifndef HYSTGEN_HAS_NO_LIMIT
-        if (limits) {
-            cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
-        }
+        /* gains fall: here or beyond */
+        cap = limits ? begin + (t->inside[on] - start) * s->slope : cap;
 #endif
         m->from_input = -hystgen_along(m, from);
         m->from_output = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
+        m->behind = k == 0 && !hystgen_above(from, t->range[other]) ? m->from_input : m->here.input;
     }
-    if (y < hystgen_along(m, m->here.output)) { /* by rounding */
+    if (hystgen_above(hystgen_along(m, m->here.output), y)) { /* by rounding */
         cap = input;
     } else {
         m->here.output = hystgen_along(m, y);
 #ifndef HYSTGEN_HAS_NO_LIMIT
-        cap = t->range[on] < cap ? t->range[on] : cap;
+        cap = hystgen_above(cap, t->range[on]) ? t->range[on] : cap;
 #endif
     }
     m->cap = hystgen_along(m, cap);
-    m->next = hystgen_along(m, next < cap ? next : cap);
+    m->next = hystgen_along(m, hystgen_above(cap, next) ? next : cap);
     return false;
 }
 
 /* Moves the plays to the sum `output`, up to rounding. */
 HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
                                            hystgen_corner_t *corner, hystgen_real_t output) {
-    if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
-#ifdef HYSTGEN_HAS_NO_LIMIT
-        hystgen_reverse(t, m, corner); /* deep in a chain stack matters more than bytes */
-#else
-        hystgen_reverse_apart(t, m, corner);
-#endif
+    if (hystgen_above(hystgen_along(m, m->here.output), hystgen_along(m, output))) {
+        hystgen_reverse(t, m, corner);
     }
-    const hystgen_direction_t on = hystgen_direction(m->here.rising);
-    unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
-    unsigned int passed = m->here.depth;
-    while (passed - kept > 1u) {
-        const unsigned int middle = (kept + passed) / 2;
-        const hystgen_real_t reach =
-            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
-        const bool beyond = hystgen_along(m, output - corner[middle].output) >= reach;
-        passed = beyond ? middle : passed;
-        kept = beyond ? kept : middle;
+    const hystgen_direction_t on = m->here.rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
+    unsigned int kept = 0;
+    unsigned int left = m->here.depth;
+    while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+        const hystgen_corner_t *c = &corner[kept + left / 2];
+        const hystgen_real_t reach = c->rose == on ? 0 : t->segment[c->top].reach;
+        kept += hystgen_above(reach, hystgen_along(m, output - c->output)) ? left / 2 : 0u;
+        left -= left / 2;
     }
-    m->here.k = passed < m->here.depth ? corner[passed].top : m->here.k;
-    m->here.depth = (uint_least16_t)passed;
+    m->here.k = kept + 1u < m->here.depth ? corner[kept + 1u].top : m->here.k;
+    m->here.depth = (uint_least16_t)(kept + 1u);
     m->limited = false;
     (void)hystgen_move_or_stop(t, m, &corner[kept], HYSTGEN_REAL_MAX, hystgen_along(m, output),
                                true);
@@ -187,23 +176,22 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
 /* Moves the plays to any input. True if the limit comes first, where they then stop. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input) {
-    if (hystgen_along(m, input) < hystgen_along(m, m->here.input)) {
+    if (hystgen_above(hystgen_along(m, m->here.input), hystgen_along(m, input))) {
         hystgen_reverse(t, m, corner);
     }
     const hystgen_real_t x = hystgen_along(m, input);
-    const hystgen_direction_t on = hystgen_direction(m->here.rising);
+    const hystgen_direction_t on = m->here.rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
     unsigned int kept = m->here.depth - 1u;
-    if (kept > 0 && x >= corner[kept].pass[on]) {
-        unsigned int passed = kept;
-        kept = 0; /* bisect: `passed` is passed, `kept` is not */
-        while (passed - kept > 1u) {
-            const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[on];
-            passed = beyond ? middle : passed;
-            kept = beyond ? kept : middle;
+    if (kept > 0 && !hystgen_above(corner[kept].pass[on], x)) {
+        unsigned int left = kept;
+        kept = 0;
+        while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+            const unsigned int middle = kept + left / 2;
+            kept = hystgen_above(corner[middle].pass[on], x) ? middle : kept;
+            left -= left / 2;
         }
-        m->here.k = corner[passed].top;
-        m->here.depth = (uint_least16_t)passed;
+        m->here.k = corner[kept + 1u].top;
+        m->here.depth = (uint_least16_t)(kept + 1u);
     }
     return hystgen_move_or_stop(t, m, &corner[kept], x, t->limit[on], false);
 }
@@ -214,7 +202,7 @@ HYSTGEN_SWIFT bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays
     const hystgen_real_t way = hystgen_along(m, input - m->from_input);
     const hystgen_segment_t *s = &t->segment[m->here.k + 1u];
     unsigned int more = 1; /* plays that begin to follow */
-    while (way > s[1].way) {
+    while (hystgen_order(way) > hystgen_order(s[1].way)) {
         ++s;
         ++more;
         if (more == 8u) { /* from here on, bisection is faster */
@@ -225,11 +213,11 @@ HYSTGEN_SWIFT bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays
     m->start = m->from_output + hystgen_along(m, s->reach);
     m->gain = s->gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
-    if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) { /* by rounding */
-        return false;
+    if (hystgen_above(hystgen_along(m, m->here.output), hystgen_along(m, output))) {
+        return false; /* a step back by rounding */
     }
     const hystgen_real_t next = m->from_input + hystgen_along(m, s[1].way);
-    m->next = hystgen_along(m, next) < hystgen_along(m, m->cap) ? next : m->cap;
+    m->next = hystgen_above(hystgen_along(m, m->cap), hystgen_along(m, next)) ? next : m->cap;
     m->here.k = (uint_least16_t)(m->here.k + more);
     m->here.input = input;
     m->here.output = output;

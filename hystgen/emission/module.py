@@ -177,7 +177,7 @@ def implementation(one: EmittedModel, code: Code) -> str:
         runtime.verbatim(files, name, family, name)
         for files in (
             (*(family.opening_apart if single else ()), *family.opening),
-            (*family.soft(code.kernels), "arithmetic/storage.h"),
+            ("arithmetic/storage.h", *family.soft(code.kernels)),
             family.closing if single else (),
         )
     )
@@ -298,7 +298,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         return runtime.verbatim(names, file, family, prefix)
 
     kernels = runtime.render(runtime.kernel_pieces(family), prefix, family, static=False)
-    opening, apart = whole(*family.opening), whole(*family.soft(kernels), "arithmetic/storage.h")
+    opening, apart = whole(*family.opening), whole("arithmetic/storage.h", *family.soft(kernels))
     return {
         f"{file}.h": template(
             "runtime.h.j2", family=family, rt=prefix, RT=prefix.upper(),

@@ -9,7 +9,6 @@
 #ifdef HYSTGEN_INVERSE
 /* Any sample that needs a search. */
 HYSTGEN_APART void hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
-    const hystgen_curve_t *t = &hystgen_operator_curve;
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
     unsigned int bits = 0;
@@ -19,13 +18,13 @@ HYSTGEN_APART void hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_
                                                                : HYSTGEN_STATUS_HELD;
         x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
     }
-    if (bits == HYSTGEN_STATUS_HELD) { /* not finite: repeat the last returned drive */
-        if (self->stepped && self->committed) {
-            hystgen_move_to_output(t, m, self->corner, self->returned);
-        }
-    } else if ((m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) ||
-               ((x < m->here.input || x > m->here.input) &&
-                hystgen_move_to_input(t, m, self->corner, x))) {
+    if (bits == HYSTGEN_STATUS_HELD && self->stepped && self->committed) { /* repeat the drive */
+        hystgen_move_to_output(&hystgen_operator_curve, m, self->corner, self->returned);
+    } else if (bits != HYSTGEN_STATUS_HELD &&
+               ((m->limited &&
+                 !hystgen_above(hystgen_along(m, m->here.input), hystgen_along(m, x))) ||
+                ((hystgen_above(m->here.input, x) || hystgen_above(x, m->here.input)) &&
+                 hystgen_move_to_input(&hystgen_operator_curve, m, self->corner, x)))) {
         m->limited = true;
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
@@ -47,21 +46,20 @@ HYSTGEN_APART void hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
-    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
-    bool same = false; /* the same plays follow */
-    if (on) {
-        same = m->here.rising ? x < m->next : x > m->next;
-    } else if (m->here.k == 0) {
-        same = m->here.rising ? x > m->behind && x < m->here.input
-                              : x < m->behind && x > m->here.input;
-    }
+    const bool on =
+        m->here.rising ? hystgen_above(x, m->here.input) : hystgen_above(m->here.input, x);
+    const bool same =
+        on ? (m->here.rising ? hystgen_above(m->next, x) : hystgen_above(x, m->next))
+           : m->here.k == 0 &&
+                 (m->here.rising ? hystgen_above(x, m->behind) && hystgen_above(m->here.input, x)
+                                 : hystgen_above(m->behind, x) && hystgen_above(x, m->here.input));
     if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+    if (on && (m->here.rising ? hystgen_above(m->cap, x) : hystgen_above(x, m->cap))) {
         hystgen_copy_place(&self->undo, &m->here);
         self->before = x;
         if (hystgen_move_in_block(&hystgen_operator_curve, m, x)) {
@@ -80,9 +78,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         return;
     }
     self->status |= v < applied || v > applied ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
-    if (self->stepped && !self->committed) {
-        self->returned = m->here.output;
-    }
+    self->returned = self->stepped && !self->committed ? m->here.output : self->returned;
     self->committed = true;
     if (self->before < m->here.input || self->before > m->here.input) { /* a usual step */
         hystgen_copy_place(&self->undo, &m->here);
@@ -96,12 +92,12 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 
 /* The part common to init and reset: the drive rests within its range. */
 HYSTGEN_APART void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
-    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner,
-                  &hystgen_operator_start[reset ? 1 : 0]);
-    hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner,
-                           hystgen_clamp_drive(self->plays.here.output));
-    hystgen_copy_place(&self->undo, &self->plays.here);
-    self->before = self->plays.here.input;
+    hystgen_plays_t *m = &self->plays;
+    hystgen_start(&hystgen_operator_curve, m, self->corner, &hystgen_operator_start[reset ? 1 : 0]);
+    hystgen_move_to_output(&hystgen_operator_curve, m, self->corner,
+                           hystgen_clamp_drive(m->here.output));
+    hystgen_copy_place(&self->undo, &m->here);
+    self->before = m->here.input;
     self->stepped = false;
     self->committed = false;
     self->status = 0;

@@ -150,15 +150,14 @@ def reverse(t: Curve, m: Memory) -> None:
 
 
 @jit
-def find_segment(t: Curve, k: int, end: int, way: Scalar, reach: Scalar, both: bool) -> int:
-    """The last of segments k .. end - 1 that begins before `way` and, if `both`, before `reach`; segment k does."""
-    middle = (k + end) // 2
-    while middle > k:
-        if (not both or reach > t.reach[middle]) and way > t.way[middle]:
-            k = middle
-        else:
-            end = middle
-        middle = (k + end) // 2
+def find_segment(t: Curve, k: int, left: int, way: Scalar, reach: Scalar, both: bool) -> int:
+    """The last of `left` segments from k on that begins before `way` and, if `both`, before `reach`; segment k does."""
+    half = left // 2
+    while half > 0:
+        if (not both or reach > t.reach[k + half]) and way > t.way[k + half]:
+            k += half
+        left -= half
+        half = left // 2
     return k
 
 
@@ -176,7 +175,7 @@ def move_or_stop(t: Curve, m: Memory, c: int, x: Scalar, end: Scalar, stop: bool
     limits = stop
     if m.corner.rose[c] != rising:
         limits = limits or t.reach[m.corner.top[c]] > t.inside[rising] - y
-        k = find_segment(t, k, m.corner.top[c], x + origin, end - y, limits)
+        k = find_segment(t, k, m.corner.top[c] - k, x + origin, end - y, limits)
         begin = t.way[k] - origin
         y = y + t.reach[k]
     m.plays.begin[0] = along(m, begin)
@@ -218,14 +217,16 @@ def move_to_output(t: Curve, m: Memory, output: Scalar) -> None:
         reverse(t, m)
     rising = m.here.rising[0]
     kept = 0
-    while m.here.depth[0] - kept > 1:
-        middle = (kept + m.here.depth[0]) // 2
+    left = m.here.depth[0]
+    while left > 1:
+        middle = kept + left // 2
         reach = t.literal.zero[0] if m.corner.rose[middle] == rising else t.reach[m.corner.top[middle]]
-        if along(m, output - m.corner.output[middle]) >= reach:
-            m.here.depth[0] = middle
-            m.here.k[0] = m.corner.top[middle]
-        else:
+        if reach > along(m, output - m.corner.output[middle]):
             kept = middle
+        left -= left // 2
+    if kept + 1 < m.here.depth[0]:
+        m.here.k[0] = m.corner.top[kept + 1]
+        m.here.depth[0] = kept + 1
     m.plays.limited[0] = 0
     move_or_stop(t, m, kept, t.literal.most[0], along(m, output), True)
 
@@ -239,16 +240,15 @@ def move_to_input(t: Curve, m: Memory, to: Scalar) -> bool:
     rising = m.here.rising[0]
     kept = m.here.depth[0] - 1
     if kept > 0 and x >= m.corner.passed[kept, rising]:
-        passed = kept
+        left = kept
         kept = 0
-        while passed - kept > 1:
-            middle = (kept + passed) // 2
-            if x >= m.corner.passed[middle, rising]:
-                passed = middle
-            else:
+        while left > 1:
+            middle = kept + left // 2
+            if m.corner.passed[middle, rising] > x:
                 kept = middle
-        m.here.k[0] = m.corner.top[passed]
-        m.here.depth[0] = passed
+            left -= left // 2
+        m.here.k[0] = m.corner.top[kept + 1]
+        m.here.depth[0] = kept + 1
     return move_or_stop(t, m, kept, x, t.limit[rising], False)
 
 

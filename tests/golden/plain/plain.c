@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 22a954869588fae9f19be6880ca7bd3ca77946b8ebdf7976a27ffbce3d2e32c7, without this line
+ * Text: sha256 6d03a53e5a098aa8f09e1cae8ee31537c640549abfdae51441799c0fb2b6d4b9, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -38,17 +38,30 @@
 #pragma GCC optimize("fp-contract=off")
 #endif
 
-#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define PLAIN_SOFT_FLOAT /* each operation is a library call */
-#define PLAIN_SWIFT PLAIN_APART
-#else
-#define PLAIN_SWIFT static inline
-#endif
-
 #if defined(__GNUC__)
 #define PLAIN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
 #else
 #define PLAIN_APART static
+#endif
+
+#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
+#define PLAIN_SOFT_FLOAT /* each operation is a library call */
+#define PLAIN_SWIFT PLAIN_APART
+/* An integer in the order of x: 0 for both zeros, and for a NaN beyond those of all numbers. */
+static inline int32_t plain_order(float x) {
+    const union {
+        float real;
+        int32_t bits;
+    } u = {x};
+    return u.bits < 0 ? INT32_MIN - u.bits : u.bits;
+}
+PLAIN_APART bool plain_above(float a, float b) {
+    return plain_order(a) > plain_order(b);
+}
+#else
+#define PLAIN_SWIFT static inline
+#define plain_order(x) (x)
+#define plain_above(a, b) ((a) > (b))
 #endif
 
 /* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
@@ -84,11 +97,6 @@ static void plain_copy_place(plain_place_t *to, const plain_place_t *from) {
     to->rising = from->rising;
 }
 
-/* The direction of a rising or falling move. */
-static inline plain_direction_t plain_direction(bool rising) {
-    return rising ? PLAIN_RISING : PLAIN_FALLING;
-}
-
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #ifdef PLAIN_SOFT_FLOAT
@@ -116,15 +124,15 @@ static void plain_take_back(plain_plays_t *m, const plain_place_t *to) {
    the limit. */
 PLAIN_SWIFT void plain_reverse(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
-    const plain_direction_t on = plain_direction(m->here.rising);
-    const plain_direction_t back = plain_direction(!m->here.rising);
+    const plain_direction_t on = m->here.rising ? PLAIN_RISING : PLAIN_FALLING;
+    const plain_direction_t back = m->here.rising ? PLAIN_FALLING : PLAIN_RISING;
     if (m->here.k > 0) {
         const plain_real_t x = plain_along(m, m->here.input);
         plain_corner_t *c = &corner[m->here.depth];
         c->output = m->here.output;
         c->pass[on] = x;
         const plain_real_t room = t->limit[back] + plain_along(m, m->here.output);
-        c->pass[back] = s->reach > room ? FLT_MAX : s->way - x;
+        c->pass[back] = plain_above(s->reach, room) ? FLT_MAX : s->way - x;
         c->top = m->here.k;
         c->rose = (uint_least8_t)on;
         m->here.depth = (uint_least16_t)(m->here.depth + 1u);
@@ -141,15 +149,16 @@ PLAIN_APART void plain_reverse_apart(const plain_curve_t *t, plain_plays_t *m,
     plain_reverse(t, m, corner);
 }
 
-/* Last of segments k .. end - 1 that begins before a way and, if `both`, a reach; k always does. */
-static inline unsigned int plain_find_segment(const plain_segment_t *s, unsigned int k,
-        unsigned int end, plain_real_t way, plain_real_t reach, bool both) {
-    unsigned int middle = (k + end) / 2;
-    while (middle > k) { /* bisect: segment k begins before them, segment `end` does not */
-        const bool before = (!both || reach > s[middle].reach) && way > s[middle].way;
-        k = before ? middle : k;
-        end = before ? end : middle;
-        middle = (k + end) / 2;
+/* The last of `left` segments from k on that begins before a way and, if `both`, a reach. */
+static inline unsigned int plain_find_segment(const plain_curve_t *t, unsigned int k,
+        unsigned int left, plain_real_t way, plain_real_t reach, bool both) {
+    unsigned int half = left / 2;
+    while (half > 0) { /* bisect */
+        const plain_segment_t *middle = &t->segment[k + half];
+        const bool reached = !both || plain_order(reach) > plain_order(middle->reach);
+        k = reached && plain_order(way) > plain_order(middle->way) ? k + half : k;
+        left -= half;
+        half = left / 2;
     }
     return k;
 }
@@ -158,8 +167,8 @@ static inline unsigned int plain_find_segment(const plain_segment_t *s, unsigned
    `stop`, else if it is a limit and comes first. Both are along the move. True if they stop. */
 PLAIN_APART bool plain_move_or_stop(const plain_curve_t *t, plain_plays_t *m,
         const plain_corner_t *c, plain_real_t input, plain_real_t output, bool stop) {
-    const plain_direction_t on = plain_direction(m->here.rising);
-    const plain_direction_t other = plain_direction(!m->here.rising);
+    const plain_direction_t on = m->here.rising ? PLAIN_RISING : PLAIN_FALLING;
+    const plain_direction_t other = m->here.rising ? PLAIN_FALLING : PLAIN_RISING;
     const plain_real_t from = c->pass[other];
     plain_real_t cap = c->pass[on];
     plain_real_t next = cap;
@@ -168,9 +177,9 @@ PLAIN_APART bool plain_move_or_stop(const plain_curve_t *t, plain_plays_t *m,
     unsigned int k = m->here.k;
     bool limits = stop;  /* the plays may stop in this block */
     if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
-        limits = limits || t->segment[c->top].reach > t->inside[on] - start;
-        k = limits ? plain_find_segment(t->segment, k, c->top, input + from, output - start, true)
-            : plain_find_segment(t->segment, k, c->top, input + from, 0, false);
+        limits = stop || plain_above(t->segment[c->top].reach, t->inside[on] - start);
+        k = limits ? plain_find_segment(t, k, c->top - k, input + from, output - start, true)
+            : plain_find_segment(t, k, c->top - k, input + from, 0, false);
         begin = t->segment[k].way - from;
         start = start + t->segment[k].reach;
     }
@@ -180,9 +189,9 @@ PLAIN_APART bool plain_move_or_stop(const plain_curve_t *t, plain_plays_t *m,
     m->gain = s->gain;
     m->here.k = (uint_least16_t)k;
     const plain_real_t y = stop ? output : start + (input - begin) * s->gain;
-    if (stop || y > output) {
+    if (stop || plain_above(y, output)) {
         const plain_real_t x = begin + (output - start) * s->slope;
-        m->here.input = plain_along(m, x < input ? x : input);
+        m->here.input = plain_along(m, plain_above(input, x) ? x : input);
         m->here.output = plain_along(m, output);
         plain_forget_line(m);
         return true;
@@ -192,43 +201,40 @@ PLAIN_APART bool plain_move_or_stop(const plain_curve_t *t, plain_plays_t *m,
     if (c->rose != on) {
         next = s[1].way - from;
         cap = c->rose == PLAIN_BOTTOM ? next : cap; /* all plays below its top follow */
-        if (limits) {
-            cap = begin + (t->inside[on] - start) * s->slope; /* gains fall: here or beyond */
-        }
+        /* gains fall: here or beyond */
+        cap = limits ? begin + (t->inside[on] - start) * s->slope : cap;
         m->from_input = -plain_along(m, from);
         m->from_output = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
+        m->behind = k == 0 && !plain_above(from, t->range[other]) ? m->from_input : m->here.input;
     }
-    if (y < plain_along(m, m->here.output)) { /* by rounding */
+    if (plain_above(plain_along(m, m->here.output), y)) { /* by rounding */
         cap = input;
     } else {
         m->here.output = plain_along(m, y);
-        cap = t->range[on] < cap ? t->range[on] : cap;
+        cap = plain_above(cap, t->range[on]) ? t->range[on] : cap;
     }
     m->cap = plain_along(m, cap);
-    m->next = plain_along(m, next < cap ? next : cap);
+    m->next = plain_along(m, plain_above(cap, next) ? next : cap);
     return false;
 }
 
 /* Moves the plays to the sum `output`, up to rounding. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t output) {
-    if (plain_along(m, output) < plain_along(m, m->here.output)) {
-        plain_reverse_apart(t, m, corner);
+    if (plain_above(plain_along(m, m->here.output), plain_along(m, output))) {
+        plain_reverse(t, m, corner);
     }
-    const plain_direction_t on = plain_direction(m->here.rising);
-    unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
-    unsigned int passed = m->here.depth;
-    while (passed - kept > 1u) {
-        const unsigned int middle = (kept + passed) / 2;
-        const plain_real_t reach =
-            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
-        const bool beyond = plain_along(m, output - corner[middle].output) >= reach;
-        passed = beyond ? middle : passed;
-        kept = beyond ? kept : middle;
+    const plain_direction_t on = m->here.rising ? PLAIN_RISING : PLAIN_FALLING;
+    unsigned int kept = 0;
+    unsigned int left = m->here.depth;
+    while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+        const plain_corner_t *c = &corner[kept + left / 2];
+        const plain_real_t reach = c->rose == on ? 0 : t->segment[c->top].reach;
+        kept += plain_above(reach, plain_along(m, output - c->output)) ? left / 2 : 0u;
+        left -= left / 2;
     }
-    m->here.k = passed < m->here.depth ? corner[passed].top : m->here.k;
-    m->here.depth = (uint_least16_t)passed;
+    m->here.k = kept + 1u < m->here.depth ? corner[kept + 1u].top : m->here.k;
+    m->here.depth = (uint_least16_t)(kept + 1u);
     m->limited = false;
     (void)plain_move_or_stop(t, m, &corner[kept], FLT_MAX, plain_along(m, output), true);
 }
@@ -236,23 +242,22 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
 /* Moves the plays to any input. True if the limit comes first, where they then stop. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t input) {
-    if (plain_along(m, input) < plain_along(m, m->here.input)) {
+    if (plain_above(plain_along(m, m->here.input), plain_along(m, input))) {
         plain_reverse(t, m, corner);
     }
     const plain_real_t x = plain_along(m, input);
-    const plain_direction_t on = plain_direction(m->here.rising);
+    const plain_direction_t on = m->here.rising ? PLAIN_RISING : PLAIN_FALLING;
     unsigned int kept = m->here.depth - 1u;
-    if (kept > 0 && x >= corner[kept].pass[on]) {
-        unsigned int passed = kept;
-        kept = 0; /* bisect: `passed` is passed, `kept` is not */
-        while (passed - kept > 1u) {
-            const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[on];
-            passed = beyond ? middle : passed;
-            kept = beyond ? kept : middle;
+    if (kept > 0 && !plain_above(corner[kept].pass[on], x)) {
+        unsigned int left = kept;
+        kept = 0;
+        while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+            const unsigned int middle = kept + left / 2;
+            kept = plain_above(corner[middle].pass[on], x) ? middle : kept;
+            left -= left / 2;
         }
-        m->here.k = corner[passed].top;
-        m->here.depth = (uint_least16_t)passed;
+        m->here.k = corner[kept + 1u].top;
+        m->here.depth = (uint_least16_t)(kept + 1u);
     }
     return plain_move_or_stop(t, m, &corner[kept], x, t->limit[on], false);
 }
@@ -262,7 +267,7 @@ PLAIN_SWIFT bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     const plain_real_t way = plain_along(m, input - m->from_input);
     const plain_segment_t *s = &t->segment[m->here.k + 1u];
     unsigned int more = 1; /* plays that begin to follow */
-    while (way > s[1].way) {
+    while (plain_order(way) > plain_order(s[1].way)) {
         ++s;
         ++more;
         if (more == 8u) { /* from here on, bisection is faster */
@@ -273,11 +278,11 @@ PLAIN_SWIFT bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     m->start = m->from_output + plain_along(m, s->reach);
     m->gain = s->gain;
     const plain_real_t output = m->start + (input - m->begin) * m->gain;
-    if (plain_along(m, output) < plain_along(m, m->here.output)) { /* by rounding */
-        return false;
+    if (plain_above(plain_along(m, m->here.output), plain_along(m, output))) {
+        return false; /* a step back by rounding */
     }
     const plain_real_t next = m->from_input + plain_along(m, s[1].way);
-    m->next = plain_along(m, next) < plain_along(m, m->cap) ? next : m->cap;
+    m->next = plain_above(plain_along(m, m->cap), plain_along(m, next)) ? next : m->cap;
     m->here.k = (uint_least16_t)(m->here.k + more);
     m->here.input = input;
     m->here.output = output;
@@ -335,7 +340,6 @@ static plain_real_t plain_clamp_drive(plain_real_t v) {
 
 /* Any sample that needs a search. */
 PLAIN_APART void plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
-    const plain_curve_t *t = &plain_inverse_curve;
     plain_plays_t *m = &self->plays;
     plain_real_t x = u - PLAIN_OFFSET;
     unsigned int bits = 0;
@@ -344,13 +348,12 @@ PLAIN_APART void plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
         bits = u >= -FLT_MAX && u <= FLT_MAX ? PLAIN_STATUS_INPUT_CLAMPED : PLAIN_STATUS_HELD;
         x = (u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX) - PLAIN_OFFSET;
     }
-    if (bits == PLAIN_STATUS_HELD) { /* not finite: repeat the last returned drive */
-        if (self->stepped && self->committed) {
-            plain_move_to_output(t, m, self->corner, self->returned);
-        }
-    } else if ((m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) ||
-            ((x < m->here.input || x > m->here.input) &&
-            plain_move_to_input(t, m, self->corner, x))) {
+    if (bits == PLAIN_STATUS_HELD && self->stepped && self->committed) { /* repeat the drive */
+        plain_move_to_output(&plain_inverse_curve, m, self->corner, self->returned);
+    } else if (bits != PLAIN_STATUS_HELD &&
+            ((m->limited && !plain_above(plain_along(m, m->here.input), plain_along(m, x))) ||
+            ((plain_above(m->here.input, x) || plain_above(x, m->here.input)) &&
+            plain_move_to_input(&plain_inverse_curve, m, self->corner, x)))) {
         m->limited = true;
         bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     }
@@ -372,21 +375,18 @@ PLAIN_APART void plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
-    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
-    bool same = false; /* the same plays follow */
-    if (on) {
-        same = m->here.rising ? x < m->next : x > m->next;
-    } else if (m->here.k == 0) {
-        same = m->here.rising ? x > m->behind && x < m->here.input
-            : x < m->behind && x > m->here.input;
-    }
+    const bool on = m->here.rising ? plain_above(x, m->here.input) : plain_above(m->here.input, x);
+    const bool same = on ? (m->here.rising ? plain_above(m->next, x) : plain_above(x, m->next))
+        : m->here.k == 0 &&
+            (m->here.rising ? plain_above(x, m->behind) && plain_above(m->here.input, x)
+        : plain_above(m->behind, x) && plain_above(x, m->here.input));
     if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+    if (on && (m->here.rising ? plain_above(m->cap, x) : plain_above(x, m->cap))) {
         plain_copy_place(&self->undo, &m->here);
         self->before = x;
         if (plain_move_in_block(&plain_inverse_curve, m, x)) {
@@ -405,9 +405,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
         return;
     }
     self->status |= v < applied || v > applied ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
-    if (self->stepped && !self->committed) {
-        self->returned = m->here.output;
-    }
+    self->returned = self->stepped && !self->committed ? m->here.output : self->returned;
     self->committed = true;
     if (self->before < m->here.input || self->before > m->here.input) { /* a usual step */
         plain_copy_place(&self->undo, &m->here);
@@ -421,12 +419,11 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
 
 /* The part common to init and reset: the drive rests within its range. */
 PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, bool reset) {
-    plain_start(&plain_inverse_curve, &self->plays, self->corner,
-        &plain_inverse_start[reset ? 1 : 0]);
-    plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
-        plain_clamp_drive(self->plays.here.output));
-    plain_copy_place(&self->undo, &self->plays.here);
-    self->before = self->plays.here.input;
+    plain_plays_t *m = &self->plays;
+    plain_start(&plain_inverse_curve, m, self->corner, &plain_inverse_start[reset ? 1 : 0]);
+    plain_move_to_output(&plain_inverse_curve, m, self->corner, plain_clamp_drive(m->here.output));
+    plain_copy_place(&self->undo, &m->here);
+    self->before = m->here.input;
     self->stepped = false;
     self->committed = false;
     self->status = 0;

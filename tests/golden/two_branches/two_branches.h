@@ -5,14 +5,14 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 40f41685e0bb4ee1943f7b65fb6d5a2b31c6b9fe47f7760c74d1588c44b10499, without this line
+ * Text: sha256 1344c3c943afa66dc5d42f659e60a54763ed20dd0755befb8b3c35c667835e3e, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
  * single-header
  *
  * Cost (32-bit target):
- *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for a
+ *     code at -O2       about 4972 bytes on a Cortex-M0+, 4264 on a Cortex-M4F, as measured for a
  *         similar model with 10 plays
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
@@ -256,18 +256,31 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #pragma GCC optimize("fp-contract=off")
 #endif
 
-#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define TWO_BRANCHES_SOFT_FLOAT /* each operation is a library call */
-#define TWO_BRANCHES_SWIFT TWO_BRANCHES_APART
-#else
-#define TWO_BRANCHES_SWIFT static inline
-#endif
-
 #if defined(__GNUC__)
 /* has several callers, or rarely runs */
 #define TWO_BRANCHES_APART __attribute__((noinline)) static
 #else
 #define TWO_BRANCHES_APART static
+#endif
+
+#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
+#define TWO_BRANCHES_SOFT_FLOAT /* each operation is a library call */
+#define TWO_BRANCHES_SWIFT TWO_BRANCHES_APART
+/* An integer in the order of x: 0 for both zeros, and for a NaN beyond those of all numbers. */
+static inline int32_t two_branches_order(float x) {
+    const union {
+        float real;
+        int32_t bits;
+    } u = {x};
+    return u.bits < 0 ? INT32_MIN - u.bits : u.bits;
+}
+TWO_BRANCHES_APART bool two_branches_above(float a, float b) {
+    return two_branches_order(a) > two_branches_order(b);
+}
+#else
+#define TWO_BRANCHES_SWIFT static inline
+#define two_branches_order(x) (x)
+#define two_branches_above(a, b) ((a) > (b))
 #endif
 
 /* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
@@ -476,11 +489,6 @@ static void two_branches_copy_place(two_branches_place_t *to, const two_branches
     to->rising = from->rising;
 }
 
-/* The direction of a rising or falling move. */
-static inline two_branches_direction_t two_branches_direction(bool rising) {
-    return rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
-}
-
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
         two_branches_real_t x) {
@@ -510,8 +518,9 @@ static void two_branches_take_back(two_branches_plays_t *m, const two_branches_p
 TWO_BRANCHES_SWIFT void two_branches_reverse(const two_branches_curve_t *t, two_branches_plays_t *m,
         two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
-    const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    const two_branches_direction_t back = two_branches_direction(!m->here.rising);
+    const two_branches_direction_t on = m->here.rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
+    const two_branches_direction_t back =
+        m->here.rising ? TWO_BRANCHES_FALLING : TWO_BRANCHES_RISING;
     if (m->here.k > 0) {
         const two_branches_real_t x = two_branches_along(m, m->here.input);
         two_branches_corner_t *c = &corner[m->here.depth];
@@ -534,16 +543,16 @@ TWO_BRANCHES_APART void two_branches_reverse_apart(const two_branches_curve_t *t
     two_branches_reverse(t, m, corner);
 }
 
-/* Last of segments k .. end - 1 that begins before a way and, if `both`, a reach; k always does. */
-static inline unsigned int two_branches_find_segment(const two_branches_segment_t *s,
-        unsigned int k, unsigned int end, two_branches_real_t way, two_branches_real_t reach,
-        bool both) {
-    unsigned int middle = (k + end) / 2;
-    while (middle > k) { /* bisect: segment k begins before them, segment `end` does not */
-        const bool before = (!both || reach > s[middle].reach) && way > s[middle].way;
-        k = before ? middle : k;
-        end = before ? end : middle;
-        middle = (k + end) / 2;
+/* The last of `left` segments from k on that begins before a way and, if `both`, a reach. */
+static inline unsigned int two_branches_find_segment(const two_branches_curve_t *t, unsigned int k,
+        unsigned int left, two_branches_real_t way, two_branches_real_t reach, bool both) {
+    unsigned int half = left / 2;
+    while (half > 0) { /* bisect */
+        const two_branches_segment_t *middle = &t->segment[k + half];
+        const bool reached = !both || two_branches_order(reach) > two_branches_order(middle->reach);
+        k = reached && two_branches_order(way) > two_branches_order(middle->way) ? k + half : k;
+        left -= half;
+        half = left / 2;
     }
     return k;
 }
@@ -553,8 +562,9 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
 TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
         two_branches_plays_t *m, const two_branches_corner_t *c, two_branches_real_t input,
         two_branches_real_t output, bool stop) {
-    const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    const two_branches_direction_t other = two_branches_direction(!m->here.rising);
+    const two_branches_direction_t on = m->here.rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
+    const two_branches_direction_t other =
+        m->here.rising ? TWO_BRANCHES_FALLING : TWO_BRANCHES_RISING;
     const two_branches_real_t from = c->pass[other];
     two_branches_real_t cap = c->pass[on];
     two_branches_real_t next = cap;
@@ -564,8 +574,8 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
     bool limits = stop;  /* the plays may stop in this block */
     if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
         k = limits
-            ? two_branches_find_segment(t->segment, k, c->top, input + from, output - start, true)
-            : two_branches_find_segment(t->segment, k, c->top, input + from, 0, false);
+            ? two_branches_find_segment(t, k, c->top - k, input + from, output - start, true)
+            : two_branches_find_segment(t, k, c->top - k, input + from, 0, false);
         begin = t->segment[k].way - from;
         start = start + t->segment[k].reach;
     }
@@ -577,7 +587,7 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
     const two_branches_real_t y = stop ? output : start + (input - begin) * s->gain;
     if (limits) {
         const two_branches_real_t x = begin + (output - start) * s->slope;
-        m->here.input = two_branches_along(m, x < input ? x : input);
+        m->here.input = two_branches_along(m, two_branches_above(input, x) ? x : input);
         m->here.output = two_branches_along(m, output);
         two_branches_forget_line(m);
         return true;
@@ -589,37 +599,37 @@ TWO_BRANCHES_APART bool two_branches_move_or_stop(const two_branches_curve_t *t,
         cap = c->rose == TWO_BRANCHES_BOTTOM ? next : cap; /* all plays below its top follow */
         m->from_input = -two_branches_along(m, from);
         m->from_output = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from_input : m->here.input;
+        m->behind =
+            k == 0 && !two_branches_above(from, t->range[other]) ? m->from_input : m->here.input;
     }
-    if (y < two_branches_along(m, m->here.output)) { /* by rounding */
+    if (two_branches_above(two_branches_along(m, m->here.output), y)) { /* by rounding */
         cap = input;
     } else {
         m->here.output = two_branches_along(m, y);
     }
     m->cap = two_branches_along(m, cap);
-    m->next = two_branches_along(m, next < cap ? next : cap);
+    m->next = two_branches_along(m, two_branches_above(cap, next) ? next : cap);
     return false;
 }
 
 /* Moves the plays to the sum `output`, up to rounding. */
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t output) {
-    if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
-        two_branches_reverse(t, m, corner); /* deep in a chain stack matters more than bytes */
+    if (two_branches_above(two_branches_along(m, m->here.output), two_branches_along(m, output))) {
+        two_branches_reverse(t, m, corner);
     }
-    const two_branches_direction_t on = two_branches_direction(m->here.rising);
-    unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
-    unsigned int passed = m->here.depth;
-    while (passed - kept > 1u) {
-        const unsigned int middle = (kept + passed) / 2;
-        const two_branches_real_t reach =
-            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
-        const bool beyond = two_branches_along(m, output - corner[middle].output) >= reach;
-        passed = beyond ? middle : passed;
-        kept = beyond ? kept : middle;
+    const two_branches_direction_t on = m->here.rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
+    unsigned int kept = 0;
+    unsigned int left = m->here.depth;
+    while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+        const two_branches_corner_t *c = &corner[kept + left / 2];
+        const two_branches_real_t reach = c->rose == on ? 0 : t->segment[c->top].reach;
+        kept += two_branches_above(reach, two_branches_along(m, output - c->output)) ? left / 2
+            : 0u;
+        left -= left / 2;
     }
-    m->here.k = passed < m->here.depth ? corner[passed].top : m->here.k;
-    m->here.depth = (uint_least16_t)passed;
+    m->here.k = kept + 1u < m->here.depth ? corner[kept + 1u].top : m->here.k;
+    m->here.depth = (uint_least16_t)(kept + 1u);
     m->limited = false;
     (void)two_branches_move_or_stop(t, m, &corner[kept], FLT_MAX, two_branches_along(m, output),
         true);
@@ -628,23 +638,22 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
 /* Moves the plays to any input. True if the limit comes first, where they then stop. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
-    if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
+    if (two_branches_above(two_branches_along(m, m->here.input), two_branches_along(m, input))) {
         two_branches_reverse(t, m, corner);
     }
     const two_branches_real_t x = two_branches_along(m, input);
-    const two_branches_direction_t on = two_branches_direction(m->here.rising);
+    const two_branches_direction_t on = m->here.rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
     unsigned int kept = m->here.depth - 1u;
-    if (kept > 0 && x >= corner[kept].pass[on]) {
-        unsigned int passed = kept;
-        kept = 0; /* bisect: `passed` is passed, `kept` is not */
-        while (passed - kept > 1u) {
-            const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[on];
-            passed = beyond ? middle : passed;
-            kept = beyond ? kept : middle;
+    if (kept > 0 && !two_branches_above(corner[kept].pass[on], x)) {
+        unsigned int left = kept;
+        kept = 0;
+        while (left > 1u) { /* bisect: the last corner kept is one of `left` from `kept` on */
+            const unsigned int middle = kept + left / 2;
+            kept = two_branches_above(corner[middle].pass[on], x) ? middle : kept;
+            left -= left / 2;
         }
-        m->here.k = corner[passed].top;
-        m->here.depth = (uint_least16_t)passed;
+        m->here.k = corner[kept + 1u].top;
+        m->here.depth = (uint_least16_t)(kept + 1u);
     }
     return two_branches_move_or_stop(t, m, &corner[kept], x, t->limit[on], false);
 }
@@ -655,7 +664,7 @@ TWO_BRANCHES_SWIFT bool two_branches_move_in_block(const two_branches_curve_t *t
     const two_branches_real_t way = two_branches_along(m, input - m->from_input);
     const two_branches_segment_t *s = &t->segment[m->here.k + 1u];
     unsigned int more = 1; /* plays that begin to follow */
-    while (way > s[1].way) {
+    while (two_branches_order(way) > two_branches_order(s[1].way)) {
         ++s;
         ++more;
         if (more == 8u) { /* from here on, bisection is faster */
@@ -666,11 +675,12 @@ TWO_BRANCHES_SWIFT bool two_branches_move_in_block(const two_branches_curve_t *t
     m->start = m->from_output + two_branches_along(m, s->reach);
     m->gain = s->gain;
     const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
-    if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) { /* by rounding */
-        return false;
+    if (two_branches_above(two_branches_along(m, m->here.output), two_branches_along(m, output))) {
+        return false; /* a step back by rounding */
     }
     const two_branches_real_t next = m->from_input + two_branches_along(m, s[1].way);
-    m->next = two_branches_along(m, next) < two_branches_along(m, m->cap) ? next : m->cap;
+    m->next = two_branches_above(two_branches_along(m, m->cap), two_branches_along(m, next))
+        ? next : m->cap;
     m->here.k = (uint_least16_t)(m->here.k + more);
     m->here.input = input;
     m->here.output = output;
