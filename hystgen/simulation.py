@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
 
-from hystgen.basics.problems import EffectsError
+from hystgen.arithmetic import FIXED
+from hystgen.basics.problems import EffectsError, RecordError
 from hystgen.chain.chain import join
 from hystgen.compensator import remarks
 from hystgen.model import Answers, Model
 from hystgen.records import Record, in_units
+from hystgen.records.units import quantity
+
+SIGNALS = {"forward": ("v", "y"), "inverse": ("u", "v")}
+"""Column that each operator takes, and the one it answers with."""
 
 
 def simulate_records(
@@ -25,17 +31,43 @@ def simulate_records(
     """Outputs of the model (for column v) or its inverse (for column u) over the records of one session, with remarks.
 
     `history`: drives visited before the first record; `rest`: pause in s before every record, which matters only to
-    effects. Records in other units of the same quantity are converted to the model's units. The forward model is not
-    limited to `input_range`; the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
-    EffectsError, UnsupportedEffectsError and RecordError.
+    effects. Records in other units of the same quantity are converted to the model's units; see `in_numbers_of`. The
+    forward model is not limited to `input_range`; the inverse and every `arithmetic` are. Raises NotInvertibleError,
+    FormatError, EffectsError, UnsupportedEffectsError and RecordError.
     """
-    converted = in_units(records, model.parameters.units, need=("v" if operator == "forward" else "u",))
+    converted = in_numbers_of(model, records, operator, arithmetic)
     found = _simulated(model, converted, operator, arithmetic, engine, history, rest)
     notes = [new.notes[len(old.notes) :] for old, new in zip(records, converted, strict=True)]
     return [
         (answers, [*_of(record.name, said), *more])
         for record, said, (answers, more) in zip(converted, notes, found, strict=True)
     ]
+
+
+def in_numbers_of(
+    model: Model, records: Sequence[Record], operator: str, arithmetic: str | None, sources: Sequence[object] = ()
+) -> list[Record]:
+    """The records with the operator's signal as it takes it: in the model's units, or in fixed point as codes.
+
+    `sources`: the records as given, for messages. Raises RecordError for other quantities, and for a signal in a
+    physical unit in fixed point, which would otherwise pass for codes.
+    """
+    signal, _ = SIGNALS[operator]
+    if arithmetic not in FIXED:
+        return in_units(records, model.parameters.units, need=(signal,), sources=sources)
+    lsb = f"{model.name.upper()}_{'DRIVE' if signal == 'v' else 'OUTPUT'}_LSB"
+    problems = []
+    for k, record in enumerate(records):
+        unit, source = record.units.get(signal, ""), sources[k] if k < len(sources) else None
+        if quantity(unit, signal) is not None:
+            place = os.fspath(source) if isinstance(source, str | os.PathLike) else record.name
+            problems.append(
+                f"{place}: error: column {signal} is in {unit}, but {arithmetic} takes codes; divide it by {lsb} of "
+                "the emitted header, round, and leave out the unit"
+            )
+    if problems:
+        raise RecordError(problems)
+    return in_units(records, need=(), sources=sources)
 
 
 def _simulated(
@@ -66,7 +98,7 @@ def _simulated(
             each.visit(history)
     found = []
     for record in records:
-        signal = record.columns()["v" if operator == "forward" else "u"]
+        signal = record.columns()[SIGNALS[operator][0]]
         samples, said = remarks.run(session, signal, moved)
         found.append((samples, _of(record.name, said)))
     return found
@@ -79,7 +111,7 @@ def _emulated(
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records
-    signal = record.columns()["v" if operator == "forward" else "u"]
+    signal = record.columns()[SIGNALS[operator][0]]
     run = model.answers if operator == "forward" else model.inverse().answers
     answers, said = run(signal, arithmetic, t=record.t, extra=record.extra)
     return answers, _of(record.name, said)
