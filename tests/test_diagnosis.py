@@ -48,7 +48,7 @@ from hystgen.effects.drift.model import LinearDrift
 from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.saturation.model import TanhSaturation
-from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
+from hystgen.effects.sensor_nonlinearity.model import SensorCurve, SensorPolynomial
 from hystgen.identification.joint import BentFront, DeadZones, Ends, Kept
 from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
@@ -941,6 +941,28 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     (found,) = extended.chain.simulate([run], [0.0])
     # weights are written with ten digits; each multiplies up to 100, and the offset absorbs the mean error
     assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
+
+
+@pytest.mark.parametrize("offset", [-9.0, 0.0, 14.0])
+def test_the_written_offset_is_that_in_front_of_the_sensor(tmp_path: Path, offset: float) -> None:
+    """The sensor flattens towards the ends, so the mean error behind it is not the offset in front of it."""
+    places, weights = np.array([0.0, 10.0, 20.0]), np.array([0.6, 0.5, 0.25])
+    knots = np.linspace(-30.0, 120.0, 7)
+    sensor = SensorCurve(
+        name="sensor_nonlinearity", shape="curve", knots=tuple(knots.tolist()),
+        values=tuple((60.0 * np.tanh((knots - 40.0) / 40.0)).tolist()),
+    )
+    v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
+    run = Run(np.arange(len(v)) * 1e-3, v)
+    y = sensor.mapped(offset + brute_output(v, places.tolist(), weights.tolist(), 0.0), run)
+    item = Item("made", run, y, (0.0,), 100.0)
+    fitted = Fitted(hypothesis.Structure(places, Kept(), (hypothesis.kept(sensor),)), np.empty(0), weights, 0.0)
+    ready = preparing.Prepared([item], [item], [], [], (0.0, 100.0), places)
+    given = hystgen.load(_model(tmp_path))
+    outcome = selection.Outcome(fitted, fitted, (), ())
+    extended = hystgen.Model(_extended(given.parameters, given.cascade, outcome, ready, ()))
+    assert extended.parameters.model.output_offset == pytest.approx(offset, abs=1e-6)
+    np.testing.assert_allclose(extended.simulate(v, t=run.t), y, atol=1e-5)
 
 
 def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
