@@ -38,7 +38,7 @@ from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import Line
 from hystgen.diagnosis.findings.result import AtEnd, Contender, FitErrors, Gap, Result
 from hystgen.diagnosis.run import _extended, _no_worse_than_identified
-from hystgen.diagnosis.search import acceptance, hypothesis, ranges, screening, selection
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects.ageing.model import ExponentialAgeing
@@ -963,6 +963,25 @@ def test_the_written_offset_is_that_in_front_of_the_sensor(tmp_path: Path, offse
     extended = hystgen.Model(_extended(given.parameters, given.cascade, outcome, ready, ()))
     assert extended.parameters.model.output_offset == pytest.approx(offset, abs=1e-6)
     np.testing.assert_allclose(extended.simulate(v, t=run.t), y, atol=1e-5)
+
+
+@pytest.mark.parametrize("before", [-70.0, 70.0])
+@pytest.mark.parametrize("start", [0.4, 0.7, 1.5, 3.0])
+def test_a_play_that_never_moves_gets_no_weight_behind_a_bent_sensor(before: float, start: float) -> None:
+    """It acts as an offset, which is free already: the drive moves 80 V at most, and 120 V would have to be covered."""
+    places, weights = np.array([0.0, 10.0, 60.0]), np.array([0.6, 0.5, 0.0])
+    knots = np.linspace(-60.0, 60.0, 7)
+    sensor = SensorCurve(
+        name="sensor_nonlinearity", shape="curve", knots=tuple(knots.tolist()),
+        values=tuple((50.0 * np.tanh(knots / 25.0)).tolist()),
+    )
+    v = wander(3, -40.0, 40.0)
+    run = Run(np.arange(len(v)) * 1e-3, v)
+    moved = brute_output(np.concatenate([[before], v]), places.tolist(), weights.tolist(), 0.0)[1:]
+    item = Item("made", run, sensor.mapped(8.0 + moved, run), (before,), 80.0)
+    structure = hypothesis.Structure(places, Kept(), (hypothesis.kept(sensor),))
+    found = fits.linear(structure, [item], np.empty(0), start * weights)
+    assert found.best[-1] == 0.0
 
 
 def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
