@@ -20,13 +20,8 @@ SIGNALS = {"forward": ("v", "y"), "inverse": ("u", "v")}
 
 
 def simulate_records(
-    model: Model,
-    records: Sequence[Record],
-    operator: str = "forward",
-    arithmetic: str | None = None,
-    engine: str | None = None,
-    history: Sequence[float] = (),
-    rest: float = 0.0,
+    model: Model, records: Sequence[Record], operator: str = "forward", arithmetic: str | None = None,
+    engine: str | None = None, history: Sequence[float] = (), rest: float = 0.0,
 ) -> list[Answers]:
     """Outputs of the model (for column v) or its inverse (for column u) over the records of one session, with remarks.
 
@@ -47,10 +42,10 @@ def simulate_records(
 def in_numbers_of(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None, sources: Sequence[object] = ()
 ) -> list[Record]:
-    """The records with the operator's signal as it takes it: in the model's units, or in fixed point as codes.
+    """The records with the operator's signal in the model's units; in fixed point it has to consist of codes.
 
-    `sources`: the records as given, for messages. Raises RecordError for other quantities, and for a signal in a
-    physical unit in fixed point, which would otherwise pass for codes.
+    `sources`: the records as given, for messages. Raises RecordError for a signal in another quantity, and in fixed
+    point for one in a physical unit, which would pass for codes.
     """
     signal, _ = SIGNALS[operator]
     if arithmetic not in FIXED:
@@ -71,13 +66,8 @@ def in_numbers_of(
 
 
 def _simulated(
-    model: Model,
-    records: Sequence[Record],
-    operator: str,
-    arithmetic: str | None,
-    engine: str | None,
-    history: Sequence[float],
-    rest: float,
+    model: Model, records: Sequence[Record], operator: str, arithmetic: str | None, engine: str | None,
+    history: Sequence[float], rest: float,
 ) -> list[Answers]:
     """`simulate_records` for records that are already in the model's units."""
     if operator == "inverse":

@@ -56,9 +56,8 @@ def simulate(
     column, answer = simulation.SIGNALS[operator]
     read = common.guarded(params, partial(records.read_records, data, need=(column,), **how))
     units_of_model = model.parameters.units
-    converted = common.guarded(
-        params, partial(simulation.in_numbers_of, model, read, operator, arithmetic, sources=data)
-    )
+    in_numbers = partial(simulation.in_numbers_of, model, read, operator, arithmetic, sources=data)
+    converted = common.guarded(params, in_numbers)
     for record in converted:
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             both = f"{record.name} has both {answer} and {answer}_measured"

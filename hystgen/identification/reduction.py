@@ -213,11 +213,8 @@ def play_rows(course: Course, thresholds: Array) -> Source:
 
 
 def reduce(
-    courses: Sequence[Course],
-    thresholds: Array,
-    tick: Callable[[int], None] | None = None,
-    source: Callable[[Course, Array], Source] = play_rows,
-    further: int = 0,
+    courses: Sequence[Course], thresholds: Array, tick: Callable[[int], None] | None = None,
+    source: Callable[[Course, Array], Source] = play_rows, further: int = 0,
 ) -> Reduced:
     """Reduce the records; `tick` is called with the number of samples of each chunk.
 

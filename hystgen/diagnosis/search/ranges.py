@@ -108,14 +108,14 @@ def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -
     return None if any(True for _ in checked.problems(thresholds)) else fits.entry(checked)
 
 
-class Failed(NamedTuple):
+class WiderRange(NamedTuple):
     """Held-out rms errors with the widest range that failed, and with the range kept instead."""
 
     leaves: float
     kept: float
 
 
-def ends(now: Fitted, failed: Failed | None, only_noise: bool) -> tuple[End, ...]:
+def ends(now: Fitted, failed: WiderRange | None, only_noise: bool) -> tuple[End, ...]:
     """The parameters at or beyond an end of their usual range; `failed`: errors if a wider range was tried and
     failed."""
     found = []

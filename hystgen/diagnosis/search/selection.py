@@ -21,7 +21,7 @@ from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges
 from hystgen.diagnosis.search.acceptance import apart, is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
-from hystgen.diagnosis.search.ranges import End, Failed
+from hystgen.diagnosis.search.ranges import End, WiderRange
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.effects.base import Effect
 from hystgen.identification import joint
@@ -596,7 +596,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     return Outcome(refitted, none, (), refused(rankings, why), withdrawn)
 
 
-def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], Failed | None]:
+def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], WiderRange | None]:
     """The effects fitted to all samples, without those that become needless in that fit.
 
     Also returns the errors if wider ranges were tried and failed, or None.
@@ -611,7 +611,7 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
     return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))], failed
 
 
-def _widened(now: Fitted, records: Records) -> tuple[Fitted, Failed | None]:
+def _widened(now: Fitted, records: Records) -> tuple[Fitted, WiderRange | None]:
     """The hypothesis with wider ranges for parameters at an end of theirs, as long as held-out errors fall.
 
     Also returns the errors if the widest range tried failed, or None. If only noise remains, none is tried.
@@ -623,7 +623,7 @@ def _widened(now: Fitted, records: Records) -> tuple[Fitted, Failed | None]:
         if further is None:
             break
         if not better(further, now, records.held):
-            return now, Failed(records.residual(further), records.residual(now))
+            return now, WiderRange(records.residual(further), records.residual(now))
         now = further
     return now, None
 
@@ -655,12 +655,8 @@ class _Step:
 
 
 def _step(
-    now: Fitted,
-    gap: float,
-    records: Records,
-    worth: Callable[[Option], bool] | None = None,
-    start: Fitted | None = None,
-    least: float | None = None,
+    now: Fitted, gap: float, records: Records, worth: Callable[[Option], bool] | None = None,
+    start: Fitted | None = None, least: float | None = None,
 ) -> _Step | None:
     """The best extension of a hypothesis and the extensions that were tried; None if there is no extension to try.
 
