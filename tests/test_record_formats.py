@@ -1209,3 +1209,18 @@ def test_columns_without_a_name_by_their_number(tmp_path: Path, header: str) -> 
     assert record.v.tolist() == [k % 9 for k in range(40)]
     assert record.y is not None
     assert record.y.tolist() == [k % 7 for k in range(40)]
+
+
+def test_a_column_without_a_name_is_offered_by_its_number(tmp_path: Path) -> None:
+    """The answer that the message offers is read as it stands; with a named column left, the nameless one is not
+    offered."""
+    cells = [f"{0.01 * k:.2f},{k % 9},{k % 7}" for k in range(40)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,v,", *cells]))
+    with pytest.raises(RecordError, match=r'for example --columns "y=#3"$'):
+        read_record(tmp_path / "a.csv")
+    record = read_record(tmp_path / "a.csv", {"y": "#3"})
+    assert record.y is not None
+    assert record.y.tolist() == [k % 7 for k in range(40)]
+    (tmp_path / "b.csv").write_text("\n".join(["t,v,Spalte,", *(f"{row},1" for row in cells)]))
+    with pytest.raises(RecordError, match=r'for example --columns "y=Spalte"$'):
+        read_record(tmp_path / "b.csv")

@@ -588,11 +588,11 @@ def test_a_wider_range_where_a_number_is_at_its_end() -> None:
     wider = ranges.wider(now, records)
     assert wider is not None
     assert (wider.structure.bounds[0][0], wider.structure.bounds[1][0]) == (-20.0, 60.0)
-    found, leaves = selection._widened(now, records)
-    assert leaves is None
+    found, failed = selection._widened(now, records)
+    assert failed is None
     assert found.actuator.effects[0].gain_per_degree == pytest.approx(0.4, rel=0.01)  # type: ignore[attr-defined]
     assert records.residual(found) < 1.1 * records.noise < records.residual(now)
-    (end,) = ranges.ends(found, leaves, False)
+    (end,) = ranges.ends(found, failed, False)
     at = end.found
     assert (at.key, at.end, at.usual, at.why) == ("gain_per_degree", "largest", pytest.approx(0.2), "beyond")
     assert fits.part_at_an_end(found, 0)  # having been found makes it no less unlikely
@@ -606,13 +606,14 @@ def test_a_wider_range_without_a_gain_on_held_out_records_is_left(monkeypatch: p
     records, now = of_warm(0.4)
     held = [warm(0.2, 2)]
     records = replace(records, held=held)
-    found, leaves = selection._widened(now, records)
+    found, failed = selection._widened(now, records)
     assert found is now
-    (end,) = ranges.ends(found, leaves, False)
+    (end,) = ranges.ends(found, failed, False)
     assert (end.found.why, end.found.reached) == ("no less", pytest.approx(0.6))
-    assert end.found.leaves == leaves
-    assert leaves is not None
-    assert leaves > 0.95 * records.residual(now)
+    assert failed is not None
+    assert (end.found.leaves, end.found.kept) == failed
+    assert failed.kept == records.residual(now)
+    assert failed.leaves > 0.95 * failed.kept
     monkeypatch.setattr(selection, "is_noise", lambda *_: True)
     assert selection._widened(now, records) == (now, None)
 
@@ -629,10 +630,10 @@ def test_how_often_a_range_is_widened(better: int, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(ranges, "wider", wider)
     records: Any = SimpleNamespace(held=HELD, noise=NOISE, residual=lambda each: each.left[1])
-    found, leaves = selection._widened(Made("now", 1, (1.0, 1.0)), records)  # type: ignore[arg-type]
+    found, failed = selection._widened(Made("now", 1, (1.0, 1.0)), records)  # type: ignore[arg-type]
     assert len(tried) == min(better + 1, 3)
     assert found.left[1] == 0.5 ** min(better, 3)  # type: ignore[attr-defined]
-    assert leaves == (None if better >= 3 else found.left[1])  # type: ignore[attr-defined]
+    assert failed == (None if better >= 3 else 2 * (found.left[1],))  # type: ignore[attr-defined]
 
 
 ABOUT = About((0.0, 100.0), 10.0, 1e-3, 1.0, 1.0, 1e4, 1e3, (0.0, 10.0, 20.0), frozenset())
@@ -708,5 +709,5 @@ def test_a_front_that_misleads_held_out_records_is_left_out(
 
 def test_a_parameter_that_only_the_search_has_is_said_to_be_one() -> None:
     """An example is the steepness of a piece of a sensor's curve, of which the parameter file has only the values."""
-    end = AtEnd("", 3.0, ranges.LARGEST, 3.0, None, None, "limit")
+    end = AtEnd("", 3.0, ranges.LARGEST, 3.0, None, None, None, "limit")
     assert end.sentence("sensor_nonlinearity", "um").startswith("a parameter of the search of sensor_nonlinearity is 3")

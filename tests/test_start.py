@@ -311,3 +311,12 @@ def test_skip_is_in_seconds() -> None:
     fit = hystgen.identify(record(v, y), history=(), skip=0.1, thresholds=PLACES)
     assert len(fit.used[0].skipped) == 100
     assert fit.rows[-1].max < 1e-6
+
+
+@pytest.mark.parametrize(("left_out", "moves"), [(110.0, 6.0), (98.0, 4.0), (90.0, 0.0)])
+def test_a_play_moves_only_where_its_record_is_compared(left_out: float, moves: float) -> None:
+    """On the way up to 100, a play of 47 V at 47 V moves from a drive of 94 V on; a converter's limit hides the end."""
+    v = np.concatenate([np.linspace(100.0, 0.0, 101), np.linspace(1.0, 100.0, 100)])
+    y = np.where((v > left_out) & (np.arange(len(v)) > 100), np.nan, v)
+    course = reduction.Course("made", v, y, (0.0,), 100, len(v))
+    assert reduction.travel(course, 47.0) == pytest.approx(moves, abs=1e-9)

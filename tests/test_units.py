@@ -306,3 +306,28 @@ def test_a_recorded_session_is_cut_in_the_models_units(tmp_path: Path, run: Run)
     code, _, err = run(*command)
     assert code == 2
     assert "record the session to its end" in err, err
+
+
+@pytest.mark.parametrize("operator", ["forward", "inverse"])
+def test_fixed_point_takes_and_answers_codes(operator: str, tmp_path: Path, run: Run) -> None:
+    """Whole volts would pass for codes; a code has no unit, so the answer's header has none."""
+    params = model(tmp_path)
+    signal, units, answer, lsb = {
+        "forward": ("v", ("V", "mV"), "y", "DRIVE"), "inverse": ("u", ("nm", "um"), "v", "OUTPUT"),
+    }[operator]
+    words = ("--operator", operator, "--arithmetic", "q15")
+    for own in units:
+        physical = write(tmp_path / "physical.csv", {"t [s]": T, f"{signal} [{own}]": np.round(V)})
+        code, out, err = run("simulate", params, physical, *words)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"{physical}: error: column {signal} is in {own}, but q15 takes codes; ")
+        assert f"divide it by STAGE_{lsb}_LSB of the emitted header" in err
+    codes = np.round(V * 32767 / 100.0)
+    for own in ("", " [counts]"):
+        taken = write(tmp_path / "codes.csv", {"t [s]": T, f"{signal}{own}": codes, "temperature [K]": T + 300.0})
+        code, out, err = run("simulate", params, taken, *words)
+        assert code == 0, err
+        assert list(table(out)) == ["t [s]", f"{signal}{own}", "temperature [K]", answer]
+    if operator == "forward":  # by default 100 V and the output at 100 V are 32767 codes; one code per rounding
+        lsb_of_output = float(P @ (100.0 - R)) / 32767.0
+        np.testing.assert_allclose(table(out)["y"] * lsb_of_output, Y, atol=(1 + len(R)) * lsb_of_output)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 
 import click
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import console
 from hystgen.cli import common
 
@@ -53,10 +53,11 @@ def simulate(
     model = common.load_model(params, effects)
     visited = common.history_values(history)
     how = common.reading_options(**reading)
-    column, answer = ("v", "y") if operator == "forward" else ("u", "v")
+    column, answer = simulation.SIGNALS[operator]
     read = common.guarded(params, partial(records.read_records, data, need=(column,), **how))
     units_of_model = model.parameters.units
-    converted = common.guarded(params, partial(records.in_units, read, units_of_model, need=(column,), sources=data))
+    in_numbers = partial(simulation.in_numbers_of, model, read, operator, arithmetic, sources=data)
+    converted = common.guarded(params, in_numbers)
     for record in converted:
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             both = f"{record.name} has both {answer} and {answer}_measured"
@@ -82,7 +83,7 @@ def simulate(
             columns[f"{answer}_measured"] = columns.pop(answer)
             units[f"{answer}_measured"] = units.pop(answer, "")
         columns[answer] = answers
-        if record.units.keys() - {"t"}:  # if the header has units, so has the output column
+        if record.units.keys() - {"t"} and arithmetic not in FIXED:  # with units in the header, except for codes
             units[answer] = getattr(units_of_model, "output" if answer == "y" else "input")
         header = records.headers(columns, units)
         if target is None:

@@ -362,7 +362,6 @@ def _extended(
 
 
 def _offset(fitted: Fitted, item: Item) -> float:
-    actuator = fitted.actuator
-    rows, constant = actuator.columns(item, fitted.weights)
-    predicted = actuator.compared(rows[0] + constant, item) + actuator.added(item.run)[item.compared]
-    return float(np.mean(item.y[item.compared] - predicted))
+    """The offset in front of a sensor that fits the record best, which starts at rest as a simulation does."""
+    rows, constant = fitted.actuator.columns(item, fitted.weights)
+    return float(fitted.actuator.level(rows[0] + constant, item, fitted.weights, at_rest=True)[0][0])

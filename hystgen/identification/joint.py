@@ -430,12 +430,8 @@ class Limits(Protocol):
 
 
 def search(
-    linear: Callable[[Array, Array], LocalFit],
-    limits: Limits,
-    now: LocalFit,
-    most: int = MOST_STEPS,
-    little: float = 0.0,
-    damping: float = DAMPING,
+    linear: Callable[[Array, Array], LocalFit], limits: Limits, now: LocalFit, most: int = MOST_STEPS,
+    little: float = 0.0, damping: float = DAMPING,
 ) -> tuple[LocalFit, float]:
     """The best shape near that of `now`, and the damping with which the search would continue.
 

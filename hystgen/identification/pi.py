@@ -81,9 +81,7 @@ class Solution:
 
 
 def solve(
-    courses: Sequence[Course],
-    wanted: int | tuple[float, ...] | None,
-    floor: float,
+    courses: Sequence[Course], wanted: int | tuple[float, ...] | None, floor: float,
     tick: Callable[[int], None] | None = None,
 ) -> tuple[Solution, list[Course]]:
     """Choose thresholds (unless given as a list) and fit the weights; also returns the courses as they were compared.

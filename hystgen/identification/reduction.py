@@ -154,8 +154,8 @@ def travel(course: Course, threshold: float) -> float:
     the range of the drive: any further movement depends on the start, which is at best estimated.
     """
     start = start_states(course.v, course.visited, np.array([threshold]))[0]
-    moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
-    whole = float(np.ptp(moved))
+    moved = operators.play(course.v[: course.last], threshold, float(start))
+    whole = float(np.ptp(moved[course.compared] if course.used else moved[course.first :]))
     if course.first >= replace(course, start=None).resettled(threshold).first:
         return whole
     return min(whole, float(np.ptp(course.v[course.begin : course.last])) - 2.0 * threshold)
@@ -213,11 +213,8 @@ def play_rows(course: Course, thresholds: Array) -> Source:
 
 
 def reduce(
-    courses: Sequence[Course],
-    thresholds: Array,
-    tick: Callable[[int], None] | None = None,
-    source: Callable[[Course, Array], Source] = play_rows,
-    further: int = 0,
+    courses: Sequence[Course], thresholds: Array, tick: Callable[[int], None] | None = None,
+    source: Callable[[Course, Array], Source] = play_rows, further: int = 0,
 ) -> Reduced:
     """Reduce the records; `tick` is called with the number of samples of each chunk.
 

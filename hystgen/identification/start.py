@@ -95,11 +95,8 @@ def estimated(
 
 
 def needed(
-    courses: Sequence[Course],
-    stages: Sequence[Stage] = (),
-    wanted: int | tuple[float, ...] | None = None,
-    least: float = LEAST_KNOWN,
-    largest: float = math.inf,
+    courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None,
+    least: float = LEAST_KNOWN, largest: float = math.inf,
 ) -> list[Course]:
     """The courses, with a start memory (`estimated`) for each that would otherwise have too few comparable samples.
 
@@ -118,11 +115,7 @@ def needed(
 
 
 def of_model(
-    courses: Sequence[Course],
-    stages: Sequence[Stage],
-    thresholds: Array,
-    weights: Array,
-    least: float = LEAST_KNOWN,
+    courses: Sequence[Course], stages: Sequence[Stage], thresholds: Array, weights: Array, least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
     """The courses for judging a model with fixed weights; the starts of courses that are not `lacking` are ignored.

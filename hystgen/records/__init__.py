@@ -64,13 +64,8 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
 
 
 def read_records(
-    sources: Source | Iterable[Source],
-    columns: Mapping[str, str] | None = None,
-    sample_time: float | None = None,
-    delimiter: str | None = None,
-    need: Sequence[str] = ("v", "y"),
-    progress: bool = False,
-    points: bool = False,
+    sources: Source | Iterable[Source], columns: Mapping[str, str] | None = None, sample_time: float | None = None,
+    delimiter: str | None = None, need: Sequence[str] = ("v", "y"), progress: bool = False, points: bool = False,
 ) -> list[Record]:
     """Read several data files as `read_record` does; records already in memory are kept.
 
@@ -114,11 +109,8 @@ def read_records(
 
 
 def read_record(
-    path: Source,
-    columns: Mapping[str, str] | None = None,
-    sample_time: float | None = None,
-    delimiter: str | None = None,
-    need: Sequence[str] = ("v", "y"),
+    path: Source, columns: Mapping[str, str] | None = None, sample_time: float | None = None,
+    delimiter: str | None = None, need: Sequence[str] = ("v", "y"),
 ) -> Record:
     """Read one data file, or make a record from samples in memory.
 
@@ -138,13 +130,9 @@ def read_record(
 
 
 def in_units(
-    records: Iterable[Record],
-    model: HasUnits | None = None,
-    *,
-    need: Sequence[str] = ("v", "y"),
+    records: Iterable[Record], model: HasUnits | None = None, *, need: Sequence[str] = ("v", "y"),
     file: tuple[str, Mapping[str, str] | None] = ("", None),
-    named: tuple[str, Mapping[str, str] | None] = ("units", None),
-    sources: Sequence[object] = (),
+    named: tuple[str, Mapping[str, str] | None] = ("units", None), sources: Sequence[object] = (),
 ) -> list[Record]:
     """The records with each column in `need`, and temperatures, in a single unit; each conversion adds a note to the
     record.
@@ -203,13 +191,8 @@ def _check_arrays(record: Record) -> None:
 
 
 def _read(
-    file: str,
-    columns: Mapping[str, str] | None,
-    sample_time: float | None,
-    delimiter: str | None,
-    need: Sequence[str],
-    tick: Callable[[float], None],
-    points: bool,
+    file: str, columns: Mapping[str, str] | None, sample_time: float | None, delimiter: str | None, need: Sequence[str],
+    tick: Callable[[float], None], points: bool,
 ) -> Record:
     reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter

@@ -451,19 +451,25 @@ class Finder:
         )
 
     def _example(self, unnamed: Sequence[str], found: Mapping[str, Column]) -> str:
-        """An example that assigns the remaining columns in file order, if there are only as many as are needed."""
+        """An example that assigns the remaining columns in file order, if there are only as many as are needed.
+
+        Columns without a name count only if those with one do not suffice.
+        """
         taken = set(found.values())
-        free = [c for c in self.columns if c.name and c not in taken and not _words(c) & COUNTING]
-        times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
-        others = iter([c for c in free if c not in times])
-        answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
-        if None in answers.values() or next(others, None) is not None:
-            return ""
-        return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
+        for nameless in (False, True):
+            free = [c for c in self.columns if (c.name or nameless) and c not in taken and not _words(c) & COUNTING]
+            times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
+            others = iter([c for c in free if c not in times])
+            answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
+            if None not in answers.values() and next(others, None) is None:
+                said = ",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)
+                return f', for example --columns "{said}"'
+        return ""
 
     def _address(self, c: Column) -> str:
-        """How to refer to a column in `--columns`: its name, or its number if the name is ambiguous or has a comma."""
-        alone = sum(each.name == c.name for each in self.columns) == 1
+        """How to refer to a column in `--columns`: its name, or its number if it has none, or one that is ambiguous or
+        has a comma."""
+        alone = c.name and sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
     def _one(self, ours: str, required: bool) -> Column | None:

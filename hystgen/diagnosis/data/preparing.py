@@ -267,10 +267,7 @@ class Prepared:
 
 
 def prepare(
-    records: Sequence[Record],
-    holdout: Sequence[Record],
-    history: tuple[float, ...] | None,
-    rest: float,
+    records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float,
     skip: float = 0.0,
 ) -> Prepared:
     """Items for the fits; without a usable held-out record, every third record or the end of each is held out.

@@ -58,10 +58,11 @@ class AtEnd:
     """An effect's parameter that is at or beyond an end of its range.
 
     `key`, `value`: as in the parameter file; `end`: `least` or `largest`; `usual`: value at that end of the usual
-    range; `reached`: value at that end of the widest range that was tried and failed, or None; `leaves`: held-out rms
-    error with that range, or None; `why`: `beyond`, the error is smaller beyond the usual range; `no less`, a wider
-    range does not reduce the error; `limit`, no wider range is possible; `firm`, ranges of the nominal model and of
-    your own effects are not widened; `noise`, the error is down to noise, so no wider range was tried.
+    range; `reached`: value at that end of the widest range that was tried and failed, or None; `leaves`, `kept`:
+    held-out rms errors with that range and with the one kept, or None; `why`: `beyond`, the error is smaller beyond the
+    usual range; `no less`, a wider range does not reduce the error enough; `limit`, no wider range is possible; `firm`,
+    ranges of the nominal model and of your own effects are not widened; `noise`, the error is down to noise, so no
+    wider range was tried.
     """
 
     key: str
@@ -70,6 +71,7 @@ class AtEnd:
     usual: float
     reached: float | None
     leaves: float | None
+    kept: float | None
     why: str
 
     def sentence(self, name: str, unit: str | None) -> str:
@@ -78,10 +80,11 @@ class AtEnd:
         if self.why == "beyond":
             return f"{what} is {self.value:.4g}, beyond its usual range, which ends at {self.usual:.4g} and fits worse"
         said = f"{what} is {self.value:.4g}, the {self.end} value tried"
-        if self.why == "no less" and self.leaves is not None and self.reached is not None:
-            left = f"{self.leaves:.4g}{' ' if unit else ''}{unit or ''} rms on held-out records"
-            gain = f"{100.0 * acceptance.BETTER:g} %"
-            return f"{said}: a range up to {self.reached:.4g} leaves {left}, less than {gain} better"
+        if self.why == "no less" and self.leaves is not None and self.kept is not None and self.reached is not None:
+            left, kept = (f"{error:.4g}{' ' if unit else ''}{unit or ''}" for error in (self.leaves, self.kept))
+            gain = 100.0 * (1.0 - self.leaves / self.kept)
+            less = "no less" if gain <= 0.0 else f"only {gain:.2g} % less"
+            return f"{said}: a range up to {self.reached:.4g} leaves {left} rms on held-out records, {less} than {kept}"
         return f"{said}: {NO_WIDER[self.why]}"
 
 

@@ -70,7 +70,9 @@ class _Block:
             bent = here.mapped(h, self._level, item.run)
             step = item.step(h)
             slope = (here.mapped(h + step, self._level, item.run) - bent) / step
+            moves = np.ptp(here.compared(rows, item), axis=1)
             rows = here.compared(rows * slope, item)
+            rows[moves <= pi.STILL * moves[0]] = 0.0  # offsets: the derivative of the free one differs by rounding
             h = here.compared(bent, item)
             target = measured - h + p @ rows + begun
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,8 +108,15 @@ def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -
     return None if any(True for _ in checked.problems(thresholds)) else fits.entry(checked)
 
 
-def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]:
-    """The parameters at or beyond an end of their usual range; `leaves`: held-out rms with a wider range that
+class WiderRange(NamedTuple):
+    """Held-out rms errors with the widest range that failed, and with the range kept instead."""
+
+    leaves: float
+    kept: float
+
+
+def ends(now: Fitted, failed: WiderRange | None, only_noise: bool) -> tuple[End, ...]:
+    """The parameters at or beyond an end of their usual range; `failed`: errors if a wider range was tried and
     failed."""
     found = []
     for k in _parts_at_an_end(now):
@@ -121,12 +128,13 @@ def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]
             end, far = (usual.high, reach.high) if largest else (usual.low, reach.low)
             build = part.candidate.build
             key, value = _number(build, x, j, largest, x[j])
-            tried = j in there and leaves is not None and far[j] != x[j]
+            tried = failed if j in there and far[j] != x[j] else None
             beyond = bool(x[j] > end[j]) if largest else bool(x[j] < end[j])
             why = BEYOND if beyond else NOISE if only_noise else FIRM if part.firm else NO_LESS if tried else LIMIT
             at_end = AtEnd(
                 key, value, LARGEST if largest else LEAST, _number(build, x, j, largest, end[j])[1],
-                _number(build, x, j, largest, far[j])[1] if tried else None, leaves if tried else None, why,
+                _number(build, x, j, largest, far[j])[1] if tried else None,
+                tried.leaves if tried else None, tried.kept if tried else None, why,
             )
             found.append(End(k, part.name, at_end))
     return tuple(found)

@@ -215,13 +215,8 @@ class Records:
 
     @classmethod
     def of(
-        cls,
-        to_fit: Sequence[Item],
-        held: Sequence[Item],
-        refitted: Fitted,
-        noise: float,
-        user: Sequence[type[Effect]] = (),
-        tick: Callable[[], None] = lambda: None,
+        cls, to_fit: Sequence[Item], held: Sequence[Item], refitted: Fitted, noise: float,
+        user: Sequence[type[Effect]] = (), tick: Callable[[], None] = lambda: None,
     ) -> Records:
         """Records thinned by the errors of the refitted model; for a user's own effect, every sample is kept."""
         groups, structure = (to_fit, held), refitted.structure

@@ -21,7 +21,7 @@ from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges
 from hystgen.diagnosis.search.acceptance import apart, is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
-from hystgen.diagnosis.search.ranges import End
+from hystgen.diagnosis.search.ranges import End, WiderRange
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.effects.base import Effect
 from hystgen.identification import joint
@@ -586,8 +586,8 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
             return Outcome(refitted, now, tuple(found), tuple(rankings), written=EXTENDED)
     if not found:
         return Outcome(refitted, now, (), tuple(rankings))
-    now, found, leaves = _finished(now, found, records)
-    ends = ranges.ends(now, leaves, is_noise(records.residual(now), records.noise))
+    now, found, failed = _finished(now, found, records)
+    ends = ranges.ends(now, failed, is_noise(records.residual(now), records.noise))
     why = borne_out(now, none, records)
     if why is None:
         return Outcome(refitted, now, tuple(found), tuple(rankings), ends=ends, written=EXTENDED)
@@ -596,25 +596,25 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     return Outcome(refitted, none, (), refused(rankings, why), withdrawn)
 
 
-def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
+def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], WiderRange | None]:
     """The effects fitted to all samples, without those that become needless in that fit.
 
-    Also returns the held-out rms with wider ranges that were tried and failed, or None.
+    Also returns the errors if wider ranges were tried and failed, or None.
     """
     now = fits.fit(now.structure, records.full, now.shape, now.weights)
     kept, rest, _ = _without_needless(now, found, records)
     if kept is not now:
         now = fits.fit(kept.structure, records.full, kept.shape, kept.weights)
-    wider, leaves = _widened(now, records)
+    wider, failed = _widened(now, records)
     if wider is not now:
         now = fits.fit(wider.structure, records.full, wider.shape, wider.weights)
-    return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))], leaves
+    return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))], failed
 
 
-def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
+def _widened(now: Fitted, records: Records) -> tuple[Fitted, WiderRange | None]:
     """The hypothesis with wider ranges for parameters at an end of theirs, as long as held-out errors fall.
 
-    Also returns the held-out rms with the widest range that failed, or None. If only noise remains, none is tried.
+    Also returns the errors if the widest range tried failed, or None. If only noise remains, none is tried.
     """
     for _ in range(acceptance.WIDENINGS):
         if is_noise(records.residual(now), records.noise):
@@ -623,7 +623,7 @@ def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
         if further is None:
             break
         if not better(further, now, records.held):
-            return now, records.residual(further)
+            return now, WiderRange(records.residual(further), records.residual(now))
         now = further
     return now, None
 
@@ -655,12 +655,8 @@ class _Step:
 
 
 def _step(
-    now: Fitted,
-    gap: float,
-    records: Records,
-    worth: Callable[[Option], bool] | None = None,
-    start: Fitted | None = None,
-    least: float | None = None,
+    now: Fitted, gap: float, records: Records, worth: Callable[[Option], bool] | None = None,
+    start: Fitted | None = None, least: float | None = None,
 ) -> _Step | None:
     """The best extension of a hypothesis and the extensions that were tried; None if there is no extension to try.
 
