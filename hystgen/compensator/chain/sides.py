@@ -43,15 +43,12 @@ class BlockMemory(Protocol):
 def _then(first: Answer, k: int, verb: Answer) -> Answer:
     """A function that applies `first`, then a verb of all blocks of part k in series."""
 
-    @jit
-    def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
-        for j in range(n):
-            x = verb(t, s, j, x)
-        return x
-
     @jit(inline=True)
     def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
-        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
+        x = first(t, s, x)
+        for j in range(s.counts[k]):
+            x = verb(t.blocks[k], s.blocks[k], j, x)
+        return x
 
     return through
 
@@ -59,15 +56,12 @@ def _then(first: Answer, k: int, verb: Answer) -> Answer:
 def _back(first: Answer, k: int, verb: Answer) -> Answer:
     """As `_then`, but from the last block to the first."""
 
-    @jit
-    def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
-        for j in range(n - 1, -1, -1):
-            x = verb(t, s, j, x)
-        return x
-
     @jit(inline=True)
     def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
-        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
+        x = first(t, s, x)
+        for j in range(s.counts[k] - 1, -1, -1):
+            x = verb(t.blocks[k], s.blocks[k], j, x)
+        return x
 
     return through
 
@@ -110,7 +104,7 @@ def told(every: Sequence[Verbs], verb: str) -> Check:
     """A verb that passes a number from the caller to all blocks, and returns whether any of them had to limit it."""
 
     def and_then(first: Check, k: int, function: Check) -> Check:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory, x: Scalar) -> bool:
             limited = first(t, s, x)
             for j in range(s.counts[k]):
@@ -130,7 +124,7 @@ def resetting(every: Sequence[Verbs]) -> Action:
     """Reset all blocks to their values in the parameter file."""
 
     def and_then(first: Action, k: int, function: Action) -> Action:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory) -> None:
             first(t, s)
             for j in range(s.counts[k]):
@@ -149,7 +143,7 @@ def moves(every: Sequence[Verbs]) -> Action:
     """Pass a move of the drive on to all blocks that see it."""
 
     def and_then(first: Action, k: int, function: Action) -> Action:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory, before: Scalar, v: Scalar) -> None:
             first(t, s, before, v)
             for j in range(s.counts[k]):
