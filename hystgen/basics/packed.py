@@ -74,8 +74,9 @@ def _field(value: Untyped) -> tuple[types.Type, int, int, int]:
     if isinstance(value, Packed):
         return value._numba_type_, value.address, 0, 0
     if isinstance(value, np.ndarray):
-        assert value.ndim == 1 or value.strides[1] == value.itemsize, "rows are stored as a whole"
-        return _column_type(value.dtype), value.__array_interface__["data"][0], len(value), value.strides[0]
+        assert value.ndim == 1 or value.flags.c_contiguous, "rows follow one another"
+        stride = value.strides[0] if value.ndim == 1 else value.shape[1] * value.itemsize
+        return _column_type(value.dtype), value.__array_interface__["data"][0], len(value), stride
     return types.int64, operator.index(value), 0, 0
 
 
@@ -158,8 +159,7 @@ def _length(_: Untyped, builder: Untyped, __: Untyped, given: Untyped) -> Untype
 
 @extending.lower_builtin(operator.getitem, ColumnType, types.Type)
 def _item(context: Untyped, builder: Untyped, signature: Untyped, given: Untyped) -> Untyped:
-    address = _address(context, builder, signature.args, given)
-    return context.unpack_value(builder, signature.return_type, address)
+    return context.unpack_value(builder, signature.return_type, _address(context, builder, signature.args, given))
 
 
 @extending.lower_builtin(operator.setitem, ColumnType, types.Type, types.Type)
@@ -169,10 +169,6 @@ def _set_item(context: Untyped, builder: Untyped, signature: Untyped, given: Unt
     context.pack_value(builder, column.number, number, _address(context, builder, signature.args, given))
 
 
-def _typed(function: Untyped, of: Untyped) -> None:
-    extending.type_callable(function)(lambda _: of)
-
-
-_typed(len, lambda column: types.int64 if isinstance(column, ColumnType) else None)
-_typed(operator.getitem, lambda column, _: column.number if isinstance(column, ColumnType) else None)
-_typed(operator.setitem, lambda column, _, __: types.none if isinstance(column, ColumnType) else None)
+extending.type_callable(len)(lambda _: lambda x: types.int64 if isinstance(x, ColumnType) else None)
+extending.type_callable(operator.getitem)(lambda _: lambda x, _: x.number if isinstance(x, ColumnType) else None)
+extending.type_callable(operator.setitem)(lambda _: lambda x, _, __: types.none if isinstance(x, ColumnType) else None)

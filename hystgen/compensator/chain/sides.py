@@ -40,27 +40,15 @@ class BlockMemory(Protocol):
     def counts(self) -> Counts: ...
 
 
-def _then(first: Answer, k: int, verb: Answer) -> Answer:
-    """A function that applies `first`, then a verb of all blocks of part k in series."""
+def _then(first: Answer, k: int, verb: Answer, back: bool) -> Answer:
+    """A function that applies `first`, then a verb of all blocks of part k in series, from the last if `back`."""
 
     @jit(inline=True)
     def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
         x = first(t, s, x)
-        for j in range(s.counts[k]):
-            x = verb(t.blocks[k], s.blocks[k], j, x)
-        return x
-
-    return through
-
-
-def _back(first: Answer, k: int, verb: Answer) -> Answer:
-    """As `_then`, but from the last block to the first."""
-
-    @jit(inline=True)
-    def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
-        x = first(t, s, x)
-        for j in range(s.counts[k] - 1, -1, -1):
-            x = verb(t.blocks[k], s.blocks[k], j, x)
+        n = s.counts[k]
+        for j in range(n):
+            x = verb(t.blocks[k], s.blocks[k], n - 1 - j if back else j, x)
         return x
 
     return through
@@ -81,7 +69,7 @@ def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> I
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
         made: Answer = _nothing
         for k, function in found:
-            made = (_back if back else _then)(made, k, function)
+            made = _then(made, k, function, back)
 
         @jit
         def call(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
