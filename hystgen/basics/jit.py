@@ -58,9 +58,9 @@ Untyped: TypeAlias = Any
 # Python for want of numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling Python functions for this machine, once: up to 20 s, or 40 s if the C has effects"
+ONCE = "compiling Python functions for this machine, once: up to 10 s, or 30 s if the C has effects"
 EVERY_TIME = (
-    "compiling Python functions for this machine: up to 20 s, or 40 s if the C has effects, and again in every run, "
+    "compiling Python functions for this machine: up to 10 s, or 30 s if the C has effects, and again in every run, "
     "because no cache folder is writable; set NUMBA_CACHE_DIR to one that is"
 )
 
@@ -77,7 +77,7 @@ _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
 """[samples] Number that a process computes in Python, per function and data type, before it compiles or loads the
-function: 0.3 s for a plain model, whose functions take 8 s to compile, and 0.8 s with many effects, which take 80 s.
+function: 0.3 s for a plain model, whose functions take 2 s to compile, and 0.8 s with many effects, which take 16 s.
 Set by: `verify` of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
 _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
