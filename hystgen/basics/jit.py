@@ -23,12 +23,15 @@ import importlib.util
 import inspect
 import types
 from collections.abc import Callable, Iterator
-from typing import Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import extras
+
+if TYPE_CHECKING:
+    from hystgen.basics.packed import Untyped
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -50,9 +53,6 @@ Action: TypeAlias = Callable[..., None]
 Check: TypeAlias = Callable[..., bool]
 """Functions of tables, memory and numbers, by what they return: a number, one and whether it had to be limited,
 nothing, or yes and no. Tables and memory differ from block to block, so callers cannot name them."""
-
-Untyped: TypeAlias = Any
-"""An object of numba's, which annotates few of them."""
 
 # Called once, with a message for the user, before the first function missing from the cache is compiled, or runs as
 # Python for want of numba

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import operator
+from typing import Any, TypeAlias
 
 import numba
 import numpy as np
@@ -17,7 +18,8 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core.typing.templates import AttributeTemplate
 
-from hystgen.basics.jit import Untyped
+Untyped: TypeAlias = Any
+"""An object of numba's, which annotates few of them."""
 
 BaseTuple: Untyped = types.BaseTuple
 WORD = ir.IntType(64)
