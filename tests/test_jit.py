@@ -140,6 +140,8 @@ def mixed(t: Held, s: Held, x: Any) -> Any:
         s.row[j, 1] = t.row[j, t.row.shape[1] - 1] - x
         s.place.both[j, 1 - j] = raised(s.place.ends, j, t.place.width[j]) + t.number.dtype.type(0.1)
     s.others[0].number[1] = s.count
+    part = s.number[1:2]
+    part[0] = part[0] + len(part)
     return raised(s.others[1].ends, 1, 2.5) + len(s.others[0].row)
 
 

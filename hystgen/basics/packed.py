@@ -161,7 +161,14 @@ def _length(_: Untyped, builder: Untyped, __: Untyped, given: Untyped) -> Untype
 
 @extending.lower_builtin(operator.getitem, ColumnType, types.Type)
 def _item(context: Untyped, builder: Untyped, signature: Untyped, given: Untyped) -> Untyped:
-    return context.unpack_value(builder, signature.return_type, _address(context, builder, signature.args, given))
+    """A number, or a part from a first up to a last index, both given and within the array."""
+    column, at = signature.args
+    if not isinstance(at, types.SliceType):
+        return context.unpack_value(builder, column.number, _address(context, builder, signature.args, given))
+    part = context.make_helper(builder, at, given[1])
+    data = _address(context, builder, (column, types.int64), (given[0], part.start))
+    changed = builder.insert_value(given[0], builder.bitcast(data, builder.extract_value(given[0], 0).type), 0)
+    return builder.insert_value(changed, builder.sub(part.stop, part.start), 1)
 
 
 @extending.lower_builtin(operator.setitem, ColumnType, types.Type, types.Type)
@@ -171,6 +178,10 @@ def _set_item(context: Untyped, builder: Untyped, signature: Untyped, given: Unt
     context.pack_value(builder, column.number, number, _address(context, builder, signature.args, given))
 
 
+def _item_type(of: Untyped, at: Untyped) -> Untyped:
+    return (of if isinstance(at, types.SliceType) else of.number) if isinstance(of, ColumnType) else None
+
+
 extending.type_callable(len)(lambda _: lambda x: types.int64 if isinstance(x, ColumnType) else None)
-extending.type_callable(operator.getitem)(lambda _: lambda x, _: x.number if isinstance(x, ColumnType) else None)
+extending.type_callable(operator.getitem)(lambda _: _item_type)
 extending.type_callable(operator.setitem)(lambda _: lambda x, _, __: types.none if isinstance(x, ColumnType) else None)
