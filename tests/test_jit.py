@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras
 from hystgen.basics import jit as jitting
 from hystgen.basics.jit import Jit, jit, plain
+from hystgen.basics.structures import Real, Struct, TwoReals
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
+from hystgen.plays.slots import Range
 from hystgen.verification.comparison import expected_records
 
 pytestmark = pytest.mark.thorough
@@ -101,6 +104,67 @@ def same_bits(tables: Any, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> 
     for compiled, interpreted in zip(*found, strict=True):
         assert interpreted.answer.tobytes() == compiled.answer.tobytes(), compiled.name
         assert interpreted.status.tobytes() == compiled.status.tobytes(), compiled.name
+
+
+class Place(Struct):
+    """A structure with a structure and a row of numbers in it."""
+
+    width: Real
+    ends: Range
+    both: TwoReals
+
+
+class Held(NamedTuple):
+    """What a named tuple can hold."""
+
+    number: Any
+    row: Any
+    place: Place
+    others: tuple[Any, ...]
+    count: int
+
+
+@jit
+def raised(ends: Range, j: int, x: Any) -> Any:
+    """Raise both ends. Returns their sum."""
+    ends.low[j] += x
+    ends.high[j] += x
+    return ends.low[j] + ends.high[j]
+
+
+@jit
+def mixed(t: Held, s: Held, x: Any) -> Any:
+    """Read and write every kind of field."""
+    for j in range(len(t.number)):
+        s.number[j] = t.number[j] + x
+        s.row[j, 1] = t.row[j, t.row.shape[1] - 1] - x
+        s.place.both[j, 1 - j] = raised(s.place.ends, j, t.place.width[j]) + t.number.dtype.type(0.1)
+    s.others[0].number[1] = s.count
+    part = s.number[1:2]
+    part[0] = part[0] + len(part)
+    return raised(s.others[1].ends, 1, 2.5) + len(s.others[0].row)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_compiled_functions_read_and_write_the_arrays_of_named_tuples(dtype: type[np.floating[Any]]) -> None:
+    def held(seed: int, others: tuple[Any, ...], columns: int) -> Held:
+        some = np.random.default_rng(seed).normal(size=(4, 30)).astype(dtype)
+        places = Place.of([(a, (b, c), (d, e)) for a, b, c, d, e in some[:2, :5]], dtype)
+        return Held(some[0, 5:9:2], some[1:, 10 : 10 + columns].copy(), places, others, seed)
+
+    found = []
+    for context in (contextlib.nullcontext(), plain()):
+        inner = held(2, (), 2)
+        t, s = held(3, (), 3), held(4, (inner, inner.place), 2)
+        with context:
+            answer = mixed(t, s, dtype(0.3))
+        found.append([answer, *(x.tobytes() for x in (s.number, s.row, s.place, inner.number, inner.row, inner.place))])
+    assert found[0] == found[1]
+
+
+def test_numbers_that_are_no_integers_are_refused_outside_of_arrays() -> None:
+    with pytest.raises(TypeError):
+        mixed(Held(1.5, (), (), (), 0), Held(1, (), (), (), 0), 1)  # type: ignore[arg-type]
 
 
 def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,9 +55,9 @@ nothing; yes or no. Tables and memory differ from block to block, so callers can
 # as Python if there is no numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling Python functions for this machine, once: up to 20 s, or 40 s if the C has effects"
+ONCE = "compiling Python functions for this machine, once: up to 10 s, or 30 s if the C has effects"
 EVERY_TIME = (
-    "compiling Python functions for this machine: up to 20 s, or 40 s if the C has effects, and again in every run, "
+    "compiling Python functions for this machine: up to 10 s, or 30 s if the C has effects, and again in every run, "
     "because no cache folder is writable; set NUMBA_CACHE_DIR to one that is"
 )
 
@@ -74,7 +74,7 @@ _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
 """[samples] Number that a process handles in Python, per function and data type, before it compiles or loads the
-function: 0.3 s for a plain model, whose functions take 8 s to compile, and 0.8 s with many effects, which take 80 s.
+function: 0.3 s for a plain model, whose functions take 2 s to compile, and 0.8 s with many effects, which take 16 s.
 Set by: `verify` of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
 _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
@@ -118,7 +118,10 @@ class Jit(Generic[P, R]):
         if _plain.get():
             return self.interpreted(*given, **named)
         if _has_numba():
-            return self.entry(*given, **named)  # type: ignore[no-any-return]
+            from hystgen.basics.packed import Packed
+
+            passed = [Packed(each) if isinstance(each, tuple) and hasattr(each, "_fields") else each for each in given]
+            return self.entry(*passed, **named)  # type: ignore[no-any-return]
         _announce(interpreted)
         with plain():
             return self.interpreted(*given, **named)
@@ -150,10 +153,7 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def inner(self) -> Any:
-        """The function compiled by numba, to be called from compiled code only.
-
-        A wrapper to unpack a model's tables from Python would be more code than the function itself.
-        """
+        """The function compiled by numba, to be called from compiled code only, without wrappers for other callers."""
         return self._dispatcher("inner", {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
     def _dispatcher(self, kind: str, options: dict[str, Any]) -> Any:
@@ -162,7 +162,7 @@ class Jit(Generic[P, R]):
         _listen()
         twin = _copy(self.py_func, self.py_func.__globals__)
         twin.__qualname__ = f"{twin.__name__}_{kind}_{self.mark}"
-        made = numba.njit(**options)(twin)
+        made: Any = numba.njit(**options)(twin)
         with contextlib.suppress(RuntimeError):  # no folder is writable
             made._cache = _cache_class()(twin)  # what its enable_caching does with numba's own class
         return made
@@ -170,13 +170,17 @@ class Jit(Generic[P, R]):
     @property
     def _numba_type_(self) -> object:
         """Numba's type of the function when another one calls it."""
-        return self.inner._numba_type_
+        from hystgen.basics.packed import Callee
+
+        return Callee(self.inner)
 
     @functools.cached_property
     def mark(self) -> str:
-        """A hash of everything the compiled code depends on: constants, and the source of the function and of all
-        functions it calls."""
-        text, functions = repr(OPTIONS), [self]
+        """A hash of everything the compiled code depends on: constants, and the source of `packed`, of the function and
+        of all functions it calls."""
+        from hystgen.basics import packed
+
+        text, functions = repr(OPTIONS) + inspect.getsource(packed), [self]
         for function in functions:
             text += inspect.getsource(function.py_func) + repr(function.targetoptions)
             names = inspect.getclosurevars(function.py_func)
@@ -202,8 +206,8 @@ def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
 @overload
 def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
 def jit(function: Callable[..., object] | None = None, /, *, inline: bool = False) -> Any:
-    """Compile a function; `inline` inlines it into its callers, as suits a short function: passing it a model's many
-    tables would cost more than its computation."""
+    """Compile a function; `inline` inlines it into its callers, as suits a short one and one with a single caller:
+    compiling each function by itself takes 0.1 s, and its code is optimized again in every caller."""
     if function is None:
         return functools.partial(Jit, inline=inline)
     return Jit(function, inline)

@@ -283,7 +283,7 @@ def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hoo
         m.step.status[0] |= bits
         return m.step.answer[0]
 
-    @jit
+    @jit(inline=True)
     def inverse_take(t: Limited, s: object) -> None:
         """Absorb the pending drive."""
         m = plays(s)
@@ -313,7 +313,7 @@ def operations_of(inverse: bool, init: Action, reset: Action, visit: Action, hoo
         m.step.status[0] |= m.step.bits[0]
         return inverse_answer(m, inside)
 
-    @jit
+    @jit(inline=True)
     def inverse_commit(t: Limited, s: object, applied: Scalar) -> None:
         """Replace the last answer by the drive that was actually applied."""
         m = plays(s)

@@ -40,34 +40,16 @@ class BlockMemory(Protocol):
     def counts(self) -> Counts: ...
 
 
-def _then(first: Answer, k: int, verb: Answer) -> Answer:
-    """A function that applies `first`, then a verb of all blocks of part k in series."""
+def _then(first: Answer, k: int, verb: Answer, back: bool) -> Answer:
+    """A function that applies `first`, then a verb of all blocks of part k in series, from the last if `back`."""
 
-    @jit
-    def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
+    @jit(inline=True)
+    def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
+        x = first(t, s, x)
+        n = s.counts[k]
         for j in range(n):
-            x = verb(t, s, j, x)
+            x = verb(t.blocks[k], s.blocks[k], n - 1 - j if back else j, x)
         return x
-
-    @jit(inline=True)
-    def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
-        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
-
-    return through
-
-
-def _back(first: Answer, k: int, verb: Answer) -> Answer:
-    """As `_then`, but from the last block to the first."""
-
-    @jit
-    def each(t: object, s: object, n: int, x: Scalar) -> Scalar:
-        for j in range(n - 1, -1, -1):
-            x = verb(t, s, j, x)
-        return x
-
-    @jit(inline=True)
-    def through(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
-        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
 
     return through
 
@@ -87,7 +69,7 @@ def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> I
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
         made: Answer = _nothing
         for k, function in found:
-            made = (_back if back else _then)(made, k, function)
+            made = _then(made, k, function, back)
 
         @jit
         def call(t: ChainTables, s: BlockMemory, x: Scalar) -> Scalar:
@@ -110,7 +92,7 @@ def told(every: Sequence[Verbs], verb: str) -> Check:
     """A verb that passes a number from the caller to all blocks, and returns whether any of them had to limit it."""
 
     def and_then(first: Check, k: int, function: Check) -> Check:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory, x: Scalar) -> bool:
             limited = first(t, s, x)
             for j in range(s.counts[k]):
@@ -130,7 +112,7 @@ def resetting(every: Sequence[Verbs]) -> Action:
     """Reset all blocks to their values in the parameter file."""
 
     def and_then(first: Action, k: int, function: Action) -> Action:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory) -> None:
             first(t, s)
             for j in range(s.counts[k]):
@@ -149,7 +131,7 @@ def moves(every: Sequence[Verbs]) -> Action:
     """Pass a move of the drive on to all blocks that see it."""
 
     def and_then(first: Action, k: int, function: Action) -> Action:
-        @jit
+        @jit(inline=True)
         def both(t: ChainTables, s: BlockMemory, before: Scalar, v: Scalar) -> None:
             first(t, s, before, v)
             for j in range(s.counts[k]):

@@ -177,7 +177,7 @@ def made_of(
         y, limited = unbent(t.behind, u - offset)
         return y, limited
 
-    @jit
+    @jit(inline=True)
     def settings_reset(t: ChainTables, s: ChainState) -> None:
         """Reset offset and gains to their values in the parameter file."""
         s.own.offset[0] = t.limits.zero[0]
@@ -185,7 +185,7 @@ def made_of(
         s.reached.rest[0] = t.limits.zero[0]
         blocks_reset(t, s)
 
-    @jit
+    @jit(inline=True)
     def travelled(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Move the drive from its last value to v, in one sample."""
         blocks_move(t, s, s.own.applied[0], v)
@@ -397,7 +397,7 @@ def made_of(
         s.reached.drive[0], s.reached.rest[0] = near, rest
         return near
 
-    @jit
+    @jit(inline=True)
     def forward_absorb(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v, after the delay and the amplifier's slew limit."""
         late = sent_absorb(t, s, v) if s.own.moving[0] else sent_rest(t, s, v)
@@ -432,7 +432,7 @@ def made_of(
         preview_put(s.line, wanted)
         return preview_target(t.tap, s.line)
 
-    @jit
+    @jit(inline=True)
     def inverse_push(t: ChainTables, s: ChainState, u: Scalar) -> None:
         """Put the next reference into the preview without answering it."""
         if not finite(t, u):
@@ -485,7 +485,7 @@ def made_of(
             s.plays.step.status[0] |= LIMITED_SETTING
         s.own.offset[0] = within
 
-    @jit
+    @jit(inline=True)
     def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
         """Set the offset of the displacement, and restart drift."""
         put_offset(t, s, d)
@@ -493,7 +493,7 @@ def made_of(
             for j in range(s.counts[CLOCK]):
                 clock_reset(t.blocks[CLOCK], s.blocks[CLOCK], j)
 
-    @jit
+    @jit(inline=True)
     def correct(t: ChainTables, s: ChainState, measured: Scalar, share: Scalar) -> None:
         """Trim the offset by a share of the difference between measured and expected displacement."""
         more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.own.output[0]))
@@ -502,7 +502,7 @@ def made_of(
     def setting(put: Check) -> Action:
         """A call that sets a number in the blocks through `put`."""
 
-        @jit
+        @jit(inline=True)
         def set_number(t: ChainTables, s: ChainState, x: Scalar) -> None:
             """Set the number, within its limits."""
             if not finite(t, x):
@@ -516,7 +516,7 @@ def made_of(
         setting(told(every, f"set_{what}")) for what in ("temperature", "gain", "travel")
     )
 
-    @jit
+    @jit(inline=True)
     def start_at(t: ChainTables, s: ChainState, after: int) -> None:
         """Start from the present plays, after init (0) or reset (1)."""
         start(t, s, after)
@@ -524,20 +524,20 @@ def made_of(
         if not s.own.inverse[0]:
             s.plays.step.answer[0] = expected(t, s)
 
-    @jit
+    @jit(inline=True)
     def init(t: ChainTables, s: ChainState) -> None:
         """Set the start memory of the parameter file, and its settings."""
         settings_reset(t, s)
         plays_init(t.plays, s.plays, s.own.inverse[0])
         start_at(t, s, 0)
 
-    @jit
+    @jit(inline=True)
     def reset(t: ChainTables, s: ChainState) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         plays_reset(t.plays, s.plays, s.own.inverse[0])
         start_at(t, s, 1)
 
-    @jit
+    @jit(inline=True)
     def seen(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v in either operator."""
         if s.own.inverse[0]:
@@ -545,7 +545,7 @@ def made_of(
         else:
             forward_absorb(t, s, v)
 
-    @jit
+    @jit(inline=True)
     def settle(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Bring everything to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
