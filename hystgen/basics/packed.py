@@ -107,7 +107,7 @@ def _unbox(_, packed, c):
 
 
 class _Attributes(AttributeTemplate):
-    def generic_resolve(self, kind, name):
+    def generic_resolve(self, kind, name):  # type: ignore[override]
         return kind.attribute(name)
 
 
