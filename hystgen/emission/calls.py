@@ -99,7 +99,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     for model in models:
         chosen = emit_options(model, **options)
         kept = emitted_model(model, chosen)
-        whole = module.of(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        whole = module.of(kept, chosen, parameters_sha256(model.parameters))
         for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
         made |= module.files(whole)

@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-from hystgen.chain.static import StaticModel
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime
 from hystgen.emission.options import Options
 from hystgen.emission.text import WIDTH, Number, braces, comment_text, constant, literal, operand, structure, table
-from hystgen.parameters.files import Parameters
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
+    from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
 """A macro of a model: its name without the model's prefix, its value, and a comment."""
@@ -152,6 +151,9 @@ def _entry(letter: str, rest: Iterator[Number]) -> str:
     return literal(next(rest))
 
 
+Tabled: TypeAlias = tuple[list[ConstantTable], list[Macro]]
+"""Tables and macros of effects, or of plays that an effect moves or bends."""
+
 AnyTables: TypeAlias = "Tables | FixedTables | ChainTables"
 
 
@@ -198,16 +200,6 @@ class Numbers:
         return len(tables.start) > 1
 
 
-@dataclass(frozen=True)
-class Effects:
-    """The C of a model's effects besides its plays: tables, tables of saturation, and macros."""
-
-    compiled: Compiled
-    tables: tuple[ConstantTable, ...]
-    behind: tuple[ConstantTable, ...]
-    macros: tuple[Macro, ...]
-
-
 class Form(ABC):
     """How one kind of arithmetic writes the numbers of a model, and how it describes them if it has codes.
 
@@ -223,12 +215,13 @@ class Form(ABC):
     settings: ClassVar[Mapping[str, str]]
 
     @abstractmethod
-    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
+    def numbers(self, model: Model, options: Options, writer: Writer) -> Numbers:
         """The numbers of a model without effects."""
 
     @abstractmethod
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
+        self, model: Model, compiled: Compiled, effects: Tabled, stages: Sequence[EmittedStage], options: Options,
+        writer: Writer,
     ) -> Numbers:
         """The numbers of a model with effects, with these stages of saturation behind the plays."""
 
@@ -237,7 +230,7 @@ class Form(ABC):
         """The stages of saturation."""
 
     @abstractmethod
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
@@ -318,13 +311,6 @@ def pointers(
     return writer.entries("tables_t", f"{whose}_tables", [*places, str(len(numbers.threshold) - 1)])
 
 
-def units(parameters: Parameters) -> tuple[str, str]:
-    """Units of drive and output, as written after a number."""
-    words = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
-    drive, output = (f" {unit}" if unit else "" for unit in words)
-    return drive, output
-
-
 def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> ConstantTable:
     """The drives of an operator's start memories: these columns, and the direction of the last move."""
     first = 2 * (operator == "inverse")
@@ -398,8 +384,7 @@ class UnitTexts:
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain."""
 
-    parameters: Parameters
-    cascade: StaticModel
+    model: Model
     options: Options
     names: Names
     family: runtime.Family
@@ -416,11 +401,9 @@ class EmittedModel:
         whole = float(limits.drive.high[0]) - float(limits.drive.low[0])
         if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
             return None
-        from hystgen.chain.chain import Chain
         from hystgen.compensator.chain.measured import measured
 
-        chain, how = Chain(self.cascade, self.parameters.model.effects), self.parameters.emit.compensation
-        return measured(self.compiled, chain, how)
+        return measured(self.compiled, self.model.chain, self.model.parameters.emit.compensation)
 
     @property
     def kernel_facts(self) -> frozenset[str]:
@@ -431,7 +414,7 @@ class EmittedModel:
     @property
     def units(self) -> UnitTexts:
         """Units of drive and output."""
-        units = self.parameters.units
+        units = self.model.parameters.units
         return UnitTexts(comment_text(units.input), comment_text(units.output))
 
     @property
@@ -442,4 +425,4 @@ class EmittedModel:
     @property
     def corners(self) -> int:
         """Number of corners that the corner engine keeps, 0 for the loop engine."""
-        return self.family.corners(self.cascade.pi.n) if self.options.engine == "corners" else 0
+        return self.family.corners(self.model.cascade.pi.n) if self.options.engine == "corners" else 0

@@ -84,7 +84,7 @@ def reading(one: EmittedModel) -> list[str]:
     compiled = one.compiled
     if compiled is None or not one.options.inverse:
         return []
-    return [*_averaged(compiled), *_branches(compiled, one.parameters), *_quiet(one, compiled)]
+    return [*_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
 
 
 def _averaged(compiled: Compiled) -> list[str]:
@@ -140,7 +140,7 @@ def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
 
 def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str]:
     """The lines of a header's banner; `notes`: how the inverse reads references, and why it may be of little use."""
-    parameters, options = one.parameters, one.options
+    parameters, options = one.model.parameters, one.options
     about = comment_text(parameters.description)
     avr = [] if estimate.avr is None else [
         f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in total, "
@@ -181,9 +181,9 @@ def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str
 
 
 def _model(one: EmittedModel) -> str:
-    n = one.cascade.pi.n
-    kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.cascade.stages]
-    names = dict.fromkeys(effect.name for effect in one.parameters.model.effects)
+    n = one.model.cascade.pi.n
+    kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.model.cascade.stages]
+    names = dict.fromkeys(effect.name for effect in one.model.parameters.model.effects)
     behind = f" behind {', '.join(kinds)}" if kinds else ""
     effects = f"; effects {', '.join(names)}" if names else ""
     return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
@@ -235,7 +235,7 @@ def limits(one: EmittedModel) -> list[str]:
     numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
     bound, suffix = "against the double model, ", form.suffix
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
-    found: list[Macro] = [("N_PLAYS", str(one.cascade.pi.n), ""), *_timing(one)]
+    found: list[Macro] = [("N_PLAYS", str(one.model.cascade.pi.n), ""), *_timing(one)]
     words = ("physical units per code; code 0 is 0", "")
     found += [
         (f"{side}_LSB", literal(lsb), comment)
@@ -267,7 +267,7 @@ def limits(one: EmittedModel) -> list[str]:
 
 def _timing(one: EmittedModel) -> list[Macro]:
     """Macros about time: the sample time, and for a model with effects its consequences."""
-    kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
+    kind, period, compiled = one.family.arithmetic.real, one.model.parameters.sample_time, one.compiled
     found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, between steps")]
     if compiled is None:
         return found

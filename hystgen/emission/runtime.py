@@ -39,6 +39,8 @@ FLOAT_KERNELS = (
 )
 CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
 """The types of effects."""
+CORNER_STATE = "compensator/corners/state.h"
+"""The types of both instances in engine corners without effects."""
 HELPERS = ("arithmetic/factors.c", "effects/gains.c")
 """Functions that several effects call, in every arithmetic."""
 SIGNALS = {
@@ -262,8 +264,8 @@ class Variant:
     signals in front of them, are finer than codes; `saturates`: output codes are limited; `start_list`: each play
     starts at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind the
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
-    `waits`: it has a delay; `previews`: references are summed; `ages`: it has a gain that depends on the travel;
-    `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
+    `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
+    add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
     """
 
     engine: str
@@ -278,9 +280,9 @@ class Variant:
     braked: bool = False
     quiet: bool = False
     turning: bool = False
-    waits: bool = False
-    previews: bool = False
-    ages: bool = False
+    waiting: int = 0
+    taps: int = 0
+    calls: frozenset[str] = frozenset()
     moves: str = ""
     bends: str = ""
 
@@ -293,25 +295,24 @@ class Variant:
     @property
     def facts(self) -> frozenset[str]:
         """Facts about the model, besides those of its arithmetic."""
-        bent = self.bends not in ("", "none")
         found = {
             "CORNERS": self.engine == "corners", "START_LIST": self.start_list,
             "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
-            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
+            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waiting, "PREVIEW": self.taps,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
-            "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
-            "MOVES_APART": bent and self.moves in self.family.moves_apart,
+            "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre",
+            "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 
     @property
-    def state(self) -> str:
-        """The header with the types of both instances in engine corners without effects."""
-        return "compensator/corners/state.h"
+    def bent(self) -> bool:
+        """Whether plays are bent."""
+        return self.bends not in ("", "none")
 
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
@@ -342,7 +343,7 @@ class Variant:
         signals = (*files("limits"), *entered, f"{chain}signals.c", *brake)
         start = (*("compensator/loop_start.c",) * loops, f"{chain}chain_start.c")
         settings = (f"{chain}settings.c",) if self.chain else ()
-        travel = files("calls") if self.ages else ()
+        travel = files("calls") if "travel" in self.calls else ()
         calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *travel)
         return (*signals, *plays, *calls)
 
@@ -616,7 +617,7 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
     made = []
     for op in operators:
         named = fields(functions, op)
-        for piece in needed(_pieces([variant.state], family.facts | variant.facts), [f"hystgen_{op}_t"]):
+        for piece in needed(_pieces([CORNER_STATE], family.facts | variant.facts), [f"hystgen_{op}_t"]):
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]

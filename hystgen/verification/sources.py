@@ -75,7 +75,7 @@ def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic
 def write(folder: Path, model: Model, options: Options) -> Sources:
     """Write the emitted files and the harness into `folder`."""
     name = model.name
-    emitted = module.of(model.parameters, model.cascade, options)
+    emitted = module.of(model, options)
     texts = module.files(emitted)
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
