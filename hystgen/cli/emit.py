@@ -92,8 +92,7 @@ def _check(
     written = {name for files in texts for name in files}
     unwritten = common.guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
     if differing or unwritten:
-        sentences = [each.sentence() for one in differing for each in one.differences]
-        sentences += [each.sentence() for each in unwritten]
-        problems = dict.fromkeys(f"error: {sentence}" for sentence in sentences)
+        wrong = [*(each for one in differing for each in one.differences), *unwritten]
+        problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)

@@ -168,8 +168,8 @@ def differences(source: Sources, output: str | os.PathLike[str] = ".", **options
 
     folder, models = Path(arguments.path("output", output)), _models(source)
     files = emitted_files(models, **options)
-    unwritten = stale.orphans(folder, files, [model.name for model in models])
-    return [*(each.sentence() for each in stale.find(folder, files)), *(each.sentence() for each in unwritten)]
+    found = [*stale.find(folder, files), *stale.orphans(folder, files, [model.name for model in models])]
+    return [each.sentence() for each in found]
 
 
 @arguments.taking(emit_options, "emit")
