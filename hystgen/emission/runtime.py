@@ -14,7 +14,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar
 
 import jinja2
@@ -361,7 +360,8 @@ def data_folder(name: str) -> Path:
 
 
 @functools.cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """The settings for all templates."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(data_folder("templates")),
         undefined=jinja2.StrictUndefined,
@@ -375,7 +375,7 @@ def _environment() -> jinja2.Environment:
 
 def template(template: str, /, **values: object) -> str:
     """The text of a template filled in with these values."""
-    return _environment().get_template(template).render(values)
+    return environment().get_template(template).render(values)
 
 
 @dataclass(frozen=True)
@@ -560,8 +560,7 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
-    own: Sequence[Piece] = (),
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]], own: Sequence[Piece]
 ) -> list[Piece]:
     """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
     `api`; `own`: functions of a user's own blocks, which stay unchanged."""
