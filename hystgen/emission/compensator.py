@@ -418,9 +418,9 @@ class EmittedModel:
         return UnitTexts(comment_text(units.input), comment_text(units.output))
 
     @property
-    def calls(self) -> dict[str, list[str]]:
+    def calls(self) -> Mapping[str, Sequence[str]]:
         """By operator, the functions that a model with effects has in addition to those of every model."""
-        return {op: list(calls) for op, calls in self.glue.calls.items()} if self.glue else {}
+        return self.glue.calls if self.glue else {}
 
     @property
     def corners(self) -> int:

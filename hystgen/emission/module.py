@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -183,16 +183,6 @@ class Module:
     sha256: str
     reading: Sequence[str]
     doubts: Sequence[str]
-
-    @property
-    def name(self) -> str:
-        """The model's name."""
-        return self.compensator.names.name
-
-    @property
-    def calls(self) -> Mapping[str, Sequence[str]]:
-        """For each operator, its functions beyond those that every model has."""
-        return self.compensator.calls
 
 
 def of(model: Model, options: Options, sha256: str = "") -> Module:
