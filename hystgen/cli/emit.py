@@ -84,7 +84,8 @@ def _check(
         ) -> list[stale.Difference]:
             try:
                 with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                    return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
+                    made = calls.emitted_files(model, **other, allow_partial=options["allow_partial"])
+                    return stale.find(folder, made)
             except ValueError:  # the model no longer exists
                 return list(found)
 

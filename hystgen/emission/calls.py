@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
@@ -18,9 +18,6 @@ from hystgen.emission import module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
-
-if TYPE_CHECKING:
-    from hystgen.emission.stale import Difference
 
 Sources: TypeAlias = "ModelSource | Iterable[ModelSource]"
 
@@ -170,13 +167,3 @@ def differences(source: Sources, output: str | os.PathLike[str] = ".", **options
     files = emitted_files(models, **options)
     found = [*stale.find(folder, files), *stale.orphans(folder, files, [model.name for model in models])]
     return [each.sentence() for each in found]
-
-
-@arguments.taking(emit_options, "emit")
-def stale_files(
-    source: Sources, output: str | os.PathLike[str] = ".", **options: Any
-) -> list[Difference]:
-    """The files in folder `output` that are missing or differ, with the options of their banners."""
-    from hystgen.emission import stale
-
-    return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))
