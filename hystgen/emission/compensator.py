@@ -80,18 +80,14 @@ class Writer:
         """A writer for types that the model itself defines."""
         return Writer(self.name, self.name)
 
-    def constant(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> ConstantTable:
-        """A constant with these lines between its braces, on one line if it fits, below a comment `words`."""
-        return self._table(own, words + constant(self._declared(kind, own, sizes), lines), [(kind, math.prod(sizes))])
-
     def line(self, kind: str, own: str, values: str, *sizes: int) -> ConstantTable:
         """A constant on one line."""
         text = f"static const {self._declared(kind, own, sizes)} = {{{values}}};\n"
         return self._table(own, text, [(kind, math.prod(sizes))])
 
-    def entries(self, kind: str, own: str, entries: Iterable[str], words: str = "") -> ConstantTable:
+    def entries(self, kind: str, own: str, entries: Iterable[str]) -> ConstantTable:
         """A structure with these entries, on as few lines as they need."""
-        return self.constant(kind, own, filled(entries).splitlines(), words=words)
+        return self._table(own, constant(self._declared(kind, own, ()), filled(entries).splitlines()), [(kind, 1)])
 
     def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> ConstantTable:
         """An array of structures, one per line; `last`: text after the last one."""
@@ -172,15 +168,13 @@ class Errors:
 class Numbers:
     """The numbers of a model in an arithmetic.
 
-    `drive`, `output`: their limits; `macros`: for use by functions; `plays`: tables with an entry for each play, and
-    the start memory; `beside`: other tables; `stages`: of the memoryless part, if functions call them one by one;
-    `lsb`: physical units per code of drive and output, if there are codes; `precision`: sentences about codes and their
-    error; `envelopes`: whether an envelope limits its argument; the others as in `hystgen.emission.runtime.Variant`.
+    `macros`: for use by functions; `plays`: tables with an entry for each play, and the start memory; `beside`: other
+    tables; `stages`: of the memoryless part, if functions call them one by one; `lsb`: physical units per code of drive
+    and output, if there are codes; `precision`: sentences about codes and their error; `envelopes`: whether an envelope
+    limits its argument; the others as in `hystgen.emission.runtime.Variant`.
     """
 
     tables: AnyTables
-    drive: tuple[str, str]
-    output: tuple[str, str]
     macros: tuple[Macro, ...]
     plays: tuple[ConstantTable, ...]
     beside: tuple[ConstantTable, ...]
@@ -272,12 +266,6 @@ class Form(ABC):
     def unless_held(self, call: str) -> str:
         """What a call does with NaN and infinite arguments."""
         return ""
-
-
-def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The least and the largest drive, and the same for the output, in C."""
-    ends = [operand(x) for x in (*numbers.limits.drive[0], *numbers.limits.output[0])]
-    return (ends[0], ends[1]), (ends[2], ends[3])
 
 
 def macros(numbers: Tables | FixedTables) -> list[Macro]:

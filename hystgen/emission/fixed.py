@@ -21,7 +21,6 @@ from hystgen.emission.compensator import (
     Writer,
     drives,
     entries,
-    limits,
     macros,
     pointers,
 )
@@ -74,11 +73,10 @@ class FixedForm(Form):
         cascade, emit = model.cascade, model.parameters.emit
         t, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
         ends = t.limits
-        drive, output = limits(t)
         curves, counts = _curves(t, options, writer)
         rounding = form.inverse_rounding if options.inverse else None
         return Numbers(
-            t, drive, output, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
+            t, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
             (*_pointers(t, options, writer), *curves),
             _errors(options, (form.forward_error, form.inverse_error, rounding)),
             fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends.fine[0]) > 0,
@@ -101,10 +99,9 @@ class FixedForm(Form):
         plays: FixedTables = tables.plays
         assert codes is not None
         curves, counts = _curves(plays, options, writer)
-        drive, output = limits(tables)
         where = f" where {codes.condition}" if codes.condition else " on the same branch" * bool(plays.branches)
         return Numbers(
-            tables, drive, output, (*macros(plays), *_macros(plays), *counts, *constants),
+            tables, (*macros(plays), *_macros(plays), *counts, *constants),
             tuple(_plays(plays, options, writer, chain=True)),
             (*curves, *arrays, *_pointers(plays, options, writer), *_relaxing(tables, options, writer),
              *(each for stage in stages for each in stage.arrays)),

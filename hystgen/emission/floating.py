@@ -23,7 +23,6 @@ from hystgen.emission.compensator import (
     drives,
     entries,
     filled,
-    limits,
     macros,
     pointers,
 )
@@ -84,9 +83,8 @@ class FloatingForm(Form):
         bounds = chain_bounds(compiled, options.arithmetic)
         errors = _errors(tables, options, (bounds.forward, bounds.inverse, bounds.rounding))
         plays = _numbers(tables.plays, errors, options, writer, chain=True)
-        drive, output = limits(tables)
         return dataclasses.replace(
-            plays, tables=tables, drive=drive, output=output, macros=(*plays.macros, *constants),
+            plays, tables=tables, macros=(*plays.macros, *constants),
             beside=(*plays.beside, *arrays, *(each for stage in stages for each in stage.arrays)),
             errors=dataclasses.replace(errors, condition=condition(compiled)),
             envelopes=plays.envelopes or any(one.kind == "envelope" for one in stages),
@@ -163,9 +161,8 @@ def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain:
         read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or options.inverse}
         places = [read.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
         beside = [pointers(t, places, writer), *beside]
-    drive, output = limits(t)
     return Numbers(
-        t, drive, output, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
+        t, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
         envelopes=any(stage.kind == "envelope" for stage in stages), stages=tuple(stages),
     )
 

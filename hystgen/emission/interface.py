@@ -241,11 +241,12 @@ def limits(one: EmittedModel) -> list[str]:
         (f"{side}_LSB", literal(lsb), comment)
         for side, lsb, comment in zip(("DRIVE", "OUTPUT"), numbers.lsb, words, strict=False)
     ]
+    ends = numbers.tables.limits
     found += [
-        ("DRIVE_MIN", numbers.drive[0], drive),
-        ("DRIVE_MAX", numbers.drive[1], ""),
-        ("OUTPUT_MIN", numbers.output[0], f"{output}, over every drive history in range"),
-        ("OUTPUT_MAX", numbers.output[1], ""),
+        ("DRIVE_MIN", operand(ends.drive.low[0]), drive),
+        ("DRIVE_MAX", operand(ends.drive.high[0]), ""),
+        ("OUTPUT_MIN", operand(ends.output.low[0]), f"{output}, over every drive history in range"),
+        ("OUTPUT_MAX", operand(ends.output.high[0]), ""),
     ]
     if "forward" in one.options.operators:
         found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
@@ -352,7 +353,8 @@ def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterat
     for piece in pieces:
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
-        words = " ".join(re.sub(r"^ *\* ?", " ", line) for line in _brief(piece.text).splitlines())
+        brief = piece.text.partition("/*")[2].partition("*/")[0]
+        words = " ".join(re.sub(r"^ *\* ?", " ", line) for line in brief.splitlines())
         call, op = found["call"], found["op"]
         names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
@@ -366,10 +368,6 @@ def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterat
         ]
         above = "\n".join(["/**", *(line for mark, text in lines for line in _line(mark, text)), " */"])
         yield Piece(piece.name, f"{above}\n{piece.code.lstrip()}\n", piece.uses)
-
-
-def _brief(text: str) -> str:
-    return text.partition("/*")[2].partition("*/")[0]
 
 
 def _line(mark: str, text: str) -> list[str]:

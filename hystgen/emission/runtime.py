@@ -737,14 +737,9 @@ def _named(
     return _NAME.sub(renamed, text)
 
 
-def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
-    """Type definitions."""
-    return _named(_joined(pieces), prefix, family, prefix)
-
-
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
     """Every type definition in these headers of the run time."""
-    return types(_pieces(files, family.facts), prefix, family)
+    return _named(_joined(_pieces(files, family.facts)), prefix, family, prefix)
 
 
 def prototypes(prefix: str, family: Family) -> str:
