@@ -143,9 +143,17 @@ class Family(ABC):
         """Whether conversions to the type of inputs and answers are kept."""
         return False
 
-    @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
         """What replaces the storage-class words before functions in this arithmetic, with engine corners or loop."""
+        fixed = self.kind == "fixed"
+        apart = {
+            "IN_FLOAT_CORNERS": corners and not fixed, "BUT_IN_FLOAT_LOOP": corners or fixed, "IN_FLOAT": not fixed,
+            "IN_FIXED": fixed, "IN_FIXED_BLOCK": fixed, "IN_FIXED_CHAIN": fixed and self.chain, "IN_CHAIN": self.chain,
+        }
+        otherwise = {"IN_FIXED": "static inline ", "IN_FIXED_CHAIN": "static inline "}
+        words = {at: APART if holds else otherwise.get(at, "static ") for at, holds in apart.items()}
+        found = {f"HYSTGEN_APART_{at} ": word for at, word in words.items()}
+        return found | {"HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL " if fixed else "HYSTGEN_API "}
 
     def corners(self, plays: int) -> int:
         """Number of corners that the corner engine keeps for this many plays."""
@@ -185,10 +193,6 @@ class Family(ABC):
         return ("arithmetic/soft_float.h",) if "_SOFT_FLOAT" in kernels else ()
 
 
-def _apart(holds: bool, otherwise: str = "static ") -> str:
-    return APART if holds else otherwise
-
-
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
@@ -205,18 +209,6 @@ class FloatFamily(Family):
 
     def corners(self, plays: int) -> int:
         return plays + 1
-
-    def storage(self, corners: bool) -> dict[str, str]:
-        return {
-            "HYSTGEN_APART_IN_FLOAT_CORNERS ": _apart(corners),
-            "HYSTGEN_APART_IN_FIXED_CHAIN ": "static inline ",
-            "HYSTGEN_APART_IN_FIXED_BLOCK ": "static ",
-            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
-            "HYSTGEN_APART_IN_FIXED ": "static inline ",
-            "HYSTGEN_APART_IN_FLOAT ": APART,
-            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": _apart(corners),
-            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_API ",
-        }
 
 
 class FixedFamily(Family):
@@ -235,18 +227,6 @@ class FixedFamily(Family):
     @property
     def casts(self) -> bool:
         return self.loop
-
-    def storage(self, corners: bool) -> dict[str, str]:
-        return {
-            "HYSTGEN_APART_IN_FLOAT_CORNERS ": "static ",
-            "HYSTGEN_APART_IN_FIXED_CHAIN ": _apart(self.chain, "static inline "),
-            "HYSTGEN_APART_IN_FIXED_BLOCK ": APART,
-            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
-            "HYSTGEN_APART_IN_FIXED ": APART,
-            "HYSTGEN_APART_IN_FLOAT ": "static ",
-            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": APART,
-            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL ",
-        }
 
 
 FAMILIES: dict[str, Family] = {
