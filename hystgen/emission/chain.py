@@ -143,10 +143,13 @@ class ChainBlocks:
     rubbing: list[NamedBlock | None]
 
     @classmethod
-    def of(cls, t: ChainTables | None, operators: Sequence[str]) -> ChainBlocks:
-        """The blocks of a model."""
-        if t is None:
-            return cls({op: ([], []) for op in operators}, [], [])
+    def none(cls, operators: Sequence[str]) -> ChainBlocks:
+        """Those of a model without effects."""
+        return cls({op: ([], []) for op in operators}, [], [])
+
+    @classmethod
+    def of(cls, t: ChainTables, operators: Sequence[str]) -> ChainBlocks:
+        """The blocks of a model with effects."""
         from hystgen.compensator.chain import blocks
 
         rubbing = [

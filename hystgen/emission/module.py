@@ -35,17 +35,19 @@ def compensator(model: Model, options: Options) -> EmittedModel:
     form: Form = importlib.import_module(f"hystgen.emission.{family.form}").FORM
     names = Names(model.name, f"hystgen_{family.bits}" if options.layout == "shared-runtime" else model.name)
     writer = Writer(model.name, names.rt)
-    behind = form.behind(compiled.tables, options, writer) if compiled else []
-    blocks = chain.ChainBlocks.of(compiled.tables if compiled else None, options.operators)
+    glue: Glue | None = None
     if compiled:
+        behind = form.behind(compiled.tables, options, writer)
+        blocks = chain.ChainBlocks.of(compiled.tables, options.operators)
         effects = chain.effects(compiled.tables, blocks, form, writer.own)
         numbers = form.chained(model, compiled, effects, behind, options, writer)
     else:
         numbers = form.numbers(model, options, writer)
     variant = _variant(options, family, model.cascade, numbers, compiled)
-    glue: Glue | None = None
-    if compiled or loop:
+    if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
+    elif loop:
+        glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
     return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue)
 
 
