@@ -91,7 +91,7 @@ def measured(
     one = model(effect)
     options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
-    constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
+    constants = module.of(one, options).cost.memory.tables
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     low, high = map(float, numbers.limits.output[0] if operator == "inverse" else numbers.limits.drive[0])
     u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))

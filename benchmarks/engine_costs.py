@@ -100,7 +100,7 @@ def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -
     assert engines.kind(one.cascade, arithmetic) == kind
     options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
-    constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
+    constants = module.of(one, options).cost.memory.tables
     found = {}
     for core in engines.CORES:
         built = [_program(files, folder / f"{core}-{compiler}", core, compiler) for compiler in ("zig", "gcc")]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from hystgen.chain.chain import Chain
     from hystgen.chain.settling import Settling
-    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
@@ -168,7 +168,6 @@ class Model:
     def _check_noise_gain(self, arithmetic: str) -> None:
         """Raise UnsupportedEffectsError if the inverse amplifies the noise of the reference more than is allowed."""
         from hystgen.compensator.chain import layout, noise
-        from hystgen.compensator.chain import tables as chain_tables
         from hystgen.compensator.chain.parts import Parts
 
         how, seconds = self.parameters.emit.compensation, self.parameters.sample_time
@@ -183,8 +182,7 @@ class Model:
             f"noise_gain: {math.ceil(gain)}"
         )
         if arithmetic in FIXED:
-            compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
-            low, high = (int(end) for end in compiled.tables.limits.output[0])
+            low, high = (int(end) for end in self.compiled(arithmetic).tables.limits.output[0])
             if gain > MOST_A_CODE * (high - low):
                 raise UnsupportedEffectsError(
                     f"with a noise gain of {gain:.4g}, a step of one of the reference's {high - low} codes in "
@@ -240,15 +238,18 @@ class Model:
     ) -> Tables | FixedTables | ChainTables:
         """The tables of an emitted operator (by default the parameter file's) in the number format of `arithmetic`."""
         if self.effects:
-            from hystgen.compensator.chain import tables as chain_tables
-
             self.need_compensated(arithmetic, operator or self.parameters.emit.operator)
-            assert self.parameters.sample_time is not None
-            how = self.parameters.emit.compensation
-            return chain_tables.build(
-                self.chain, arithmetic, self.parameters.sample_time, how, self._lsb, engine
-            ).tables
+            return self.compiled(arithmetic, engine).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
+
+    def compiled(self, arithmetic: str, engine: str = "loop") -> Compiled:
+        """The numbers of a model with effects in an arithmetic. Raises FormatError."""
+        from hystgen.compensator.chain import tables as chain_tables
+
+        seconds = self.parameters.sample_time
+        assert seconds is not None, "need_compensated asks for it"
+        how = self.parameters.emit.compensation
+        return chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb, engine)
 
     @property
     def _lsb(self) -> tuple[float | None, float | None]:
@@ -312,7 +313,7 @@ class Model:
         extra: Mapping[str, ArrayLike] | None, inverse: bool,
     ) -> Answers:
         """Output (N,) of the bit-exact reference for a model with effects, and remarks; see `simulate`."""
-        from hystgen.compensator.chain import run, tables
+        from hystgen.compensator.chain import run
         from hystgen.compensator.chained import EVEN
 
         check_arithmetic(arithmetic)
@@ -332,9 +333,7 @@ class Model:
                 raise EffectsError(
                     f"{effect.name} is counted from the first sample, but t begins at {began:g} s; give t from 0 on"
                 )
-        how = self.parameters.emit.compensation
-        chosen = self.engine(engine, arithmetic=arithmetic)
-        compiled = tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen)
+        compiled = self.compiled(arithmetic, self.engine(engine, arithmetic=arithmetic))
         found, status = run.with_status(compiled, record, inverse)
         clamped, limited, held = (
             remarks.counted(status, bit) for bit in (slots.INPUT_CLAMPED, slots.OUTPUT_CLAMPED, slots.HELD)

@@ -182,7 +182,7 @@ def build(
 
 def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple[int, str]]]:
     """Codes and names of each operator's settings."""
-    calls = module.of(model.parameters, model.cascade, Options("both", arithmetic, engine, "self-contained")).calls
+    calls = module.of(model, Options("both", arithmetic, engine, "self-contained")).compensator.calls
     return {
         op: [(SETTING_CALLS[each], each) for each in SETTINGS if each in calls.get(op, ())]
         for op in ("forward", "inverse")

@@ -709,7 +709,7 @@ def test_preview_reads_ahead_what_is_late() -> None:
     assert math.fsum(numbers.taps.weights) == pytest.approx(1.0, abs=1e-12)
     assert preview.taps(2.5 * T, [], T) == (2, pytest.approx([0.5, 0.5]))
     late = model("late")
-    text = module.files(module.of(late.parameters, late.cascade, emit_options(late)))["late.h"]
+    text = module.files(module.of(late, emit_options(late)))["late.h"]
     assert "#define LATE_PREVIEW 4 " in text
     assert "late_inverse_push(" in text
     assert "LATE_SAMPLE_TIME 0.001f" in text
@@ -722,7 +722,7 @@ def with_options(name: str, **options: Any) -> Model:
 
 
 def header(one: Model, macro: str) -> str:
-    text = module.files(module.of(one.parameters, one.cascade, emit_options(one)))[f"{one.name}.h"]
+    text = module.files(module.of(one, emit_options(one)))[f"{one.name}.h"]
     found = re.search(rf"#define {one.name.upper()}_{macro} (\S+)", text)
     assert found
     return found[1]
@@ -858,7 +858,7 @@ def test_what_shapes_says_how_late_it_is(by: str) -> None:
     one = with_options("straight", resonance=by)
     how = one.parameters.emit.compensation
     numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
-    text = module.files(module.of(one.parameters, one.cascade, emit_options(one)))["straight.h"].replace("\n * ", " ")
+    text = module.files(module.of(one, emit_options(one)))["straight.h"].replace("\n * ", " ")
     form = r"the motion ([0-9.]+) samples late, and the error of a sine at 200 samples .* is ([0-9.]+) %"
     found = re.search(form, text)
     assert found
@@ -922,11 +922,11 @@ def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
 
 def test_only_what_the_model_has_is_emitted() -> None:
     one = model("creeping")
-    text = module.files(module.of(one.parameters, one.cascade, emit_options(one)))["creeping.h"]
+    text = module.files(module.of(one, emit_options(one)))["creeping.h"]
     calls = set(re.findall(r"creeping_inverse_(\w+)\(", text))
     assert calls == {"init", "reset", "step", "commit", "status", "settle", "set_offset", "expected", "correct"}
     one = model("aged")
-    text = module.files(module.of(one.parameters, one.cascade, emit_options(one)))["aged.h"]
+    text = module.files(module.of(one, emit_options(one)))["aged.h"]
     calls = set(re.findall(r"aged_inverse_(\w+)\(", text))
     assert {"travel", "set_travel", "set_gain"} <= calls
 
@@ -944,7 +944,7 @@ def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str
 
 def memory_is_that_of_the_compiler(one: Model, arithmetic: str, engine: str, tmp_path: Path) -> None:
     name = one.name
-    whole = module.of(one.parameters, one.cascade, emit_options(one, operator(name), arithmetic, engine))
+    whole = module.of(one, emit_options(one, operator(name), arithmetic, engine))
     instances = whole.cost.memory.instances
     tmp_path.mkdir()
     (tmp_path / f"{name}.h").write_text(module.files(whole)[f"{name}.h"])

@@ -740,7 +740,7 @@ _RIGHT = module.files
 
 
 def _only_stage(wrong: Callable[..., dict[str, str]], *arguments: Any, right: Any) -> dict[str, str]:
-    made: dict[str, str] = (wrong if arguments[0].name == "stage" else right)(*arguments)
+    made: dict[str, str] = (wrong if arguments[0].compensator.names.name == "stage" else right)(*arguments)
     return made
 
 

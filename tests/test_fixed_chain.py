@@ -406,7 +406,7 @@ def checked(
     written = sources.write(folder, one, options)
     source = folder / f"{own}.c"
     source.write_text(granted_states(source.read_text(), compiled(one, arithmetic)[0], own, wrong))
-    calls = module.of(one.parameters, one.cascade, options).calls
+    calls = module.of(one, options).compensator.calls
     for op in written.operators:
         (folder / f"main_{op}.c").write_text(MAIN.format(name=own, op=op))
         files = [*written.module, written.harness, folder / f"main_{op}.c"]

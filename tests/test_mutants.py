@@ -62,7 +62,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def forget() -> None:
     """Clear the caches of what has been read from the sources."""
-    runtime._environment.cache_clear()
+    runtime.environment.cache_clear()
     runtime._read.cache_clear()
     runtime._pieces_of.cache_clear()
 

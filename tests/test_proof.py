@@ -152,7 +152,7 @@ CALL = "        case {}: {}; break;\n"
 def chain_driver(one: Model, arithmetic: str) -> str:
     """A driver that makes every call of both operators of a model with effects, in any order with any codes."""
     name = one.name
-    calls = module.of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained")).calls
+    calls = module.of(one, Options("both", arithmetic, "loop", "self-contained")).compensator.calls
     cases = [
         (op, f"{name}_{op}_{call}(&{op}{f', {ANY.get(call, CODE)}()' * given})")
         for op in ("forward", "inverse")

@@ -125,14 +125,14 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
 
 def _compensator(name: str, arithmetic: str, engine: str) -> EmittedModel:
     one = model(name)
-    return module.compensator(one.parameters, one.cascade, Options("both", arithmetic, engine, "self-contained"))
+    return module.compensator(one, Options("both", arithmetic, engine, "self-contained"))
 
 
 def _states(one: EmittedModel) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
     if one.glue:
         return [runtime.CHAIN_TYPES[1]] * one.variant.chain
-    return [one.variant.state]
+    return [runtime.CORNER_STATE]
 
 
 def _blocks(one: EmittedModel) -> list[str]:

@@ -84,7 +84,8 @@ def _check(
         ) -> list[stale.Difference]:
             try:
                 with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                    return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
+                    made = calls.emitted_files(model, **other, allow_partial=options["allow_partial"])
+                    return stale.find(folder, made)
             except ValueError:  # the model no longer exists
                 return list(found)
 
@@ -92,8 +93,7 @@ def _check(
     written = {name for files in texts for name in files}
     unwritten = common.guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
     if differing or unwritten:
-        sentences = [each.sentence() for one in differing for each in one.differences]
-        sentences += [each.sentence() for each in unwritten]
-        problems = dict.fromkeys(f"error: {sentence}" for sentence in sentences)
+        wrong = [*(each for one in differing for each in one.differences), *unwritten]
+        problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)

@@ -132,7 +132,7 @@ def identify(
         console.say(fit.table())
         console.say(output)
         if plot:
-            plots.show_fit(fit, read, plot)
+            drawing.picture(lambda: plots.fit_figure(fit, read), plot)
             console.say(plot)
         if report:
             console.say(str(pages.write(fit, read, report, Path(output).name)))

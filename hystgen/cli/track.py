@@ -58,5 +58,5 @@ def track(
         common.guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
         console.say(json_file)
     if plot:
-        common.guarded(params, lambda: plots.show_tracking(found, plot))
+        common.guarded(params, lambda: drawing.picture(lambda: plots.tracking_figure(found), plot))
         console.say(plot)

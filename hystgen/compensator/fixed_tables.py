@@ -174,7 +174,10 @@ class Builder:
         self._codes()
         self._plays()
         self._weights()
-        return self._tables(), self._format()
+        return self._tables(), Format(
+            self.drive_lsb, self.output_lsb, self._forward_error(), self._inverse_error(), self._inverse_rounding(),
+            self.bound, self.held, self.bits,
+        )
 
     def gain(self) -> Fraction:
         """Largest change of the drive in front of the memoryless part per change of the wanted sum of the plays."""
@@ -337,7 +340,6 @@ class Builder:
             ascending = len(self.front) == 2
             below = max(0, self.play_bits - max(map(abs, arriving)).bit_length())
             corners = [float(c.front(float(b), ascending)) / step for b in breaks[ascending]]
-            scale = lsb / 2**below
             edge = (
                 max(1, abs(forward.at(arriving[0] + 1) - low) // 2),
                 max(1, abs(high - forward.at(arriving[1] - 1)) // 2),
@@ -534,18 +536,6 @@ class Builder:
         gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / flattest
         other = (gain * pi.slopes[-1] * gap + gap / flattest) / float(self.drive_lsb)
         return min(rounding + math.nextafter(1.001 * other, math.inf), float(self.drive[1] - self.drive[0]))
-
-    def _format(self) -> Format:
-        return Format(
-            self.drive_lsb,
-            self.output_lsb,
-            self._forward_error(),
-            self._inverse_error(),
-            self._inverse_rounding(),
-            self.bound,
-            self.held,
-            self.bits,
-        )
 
 
 def _forward(cascade: StaticModel, ascending: bool, lsb: float, step: float, code: float) -> float:

@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
@@ -18,9 +18,6 @@ from hystgen.emission import module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
-
-if TYPE_CHECKING:
-    from hystgen.emission.stale import Difference
 
 Sources: TypeAlias = "ModelSource | Iterable[ModelSource]"
 
@@ -99,7 +96,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     for model in models:
         chosen = emit_options(model, **options)
         kept = emitted_model(model, chosen)
-        whole = module.of(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        whole = module.of(kept, chosen, parameters_sha256(model.parameters))
         for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
         made |= module.files(whole)
@@ -168,15 +165,5 @@ def differences(source: Sources, output: str | os.PathLike[str] = ".", **options
 
     folder, models = Path(arguments.path("output", output)), _models(source)
     files = emitted_files(models, **options)
-    unwritten = stale.orphans(folder, files, [model.name for model in models])
-    return [*(each.sentence() for each in stale.find(folder, files)), *(each.sentence() for each in unwritten)]
-
-
-@arguments.taking(emit_options, "emit")
-def stale_files(
-    source: Sources, output: str | os.PathLike[str] = ".", **options: Any
-) -> list[Difference]:
-    """The files in folder `output` that are missing or differ, with the options of their banners."""
-    from hystgen.emission import stale
-
-    return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))
+    found = [*stale.find(folder, files), *stale.orphans(folder, files, [model.name for model in models])]
+    return [each.sentence() for each in found]

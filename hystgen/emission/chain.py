@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.emission.compensator import ConstantTable, Effects, EmittedStage, Field, Form, Glue, Writer
-from hystgen.emission.runtime import template
+from hystgen.emission.compensator import ConstantTable, EmittedStage, Field, Form, Glue, Tabled, Writer
+from hystgen.emission.runtime import Variant, template
 from hystgen.emission.text import literal, operand
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.basics.structures import Struct
-    from hystgen.compensator.chain.layout import ChainTables, Compiled
+    from hystgen.compensator.chain.layout import ChainTables
     from hystgen.effects.kinds import BlockKind, Constants
 
 NUMBERS = {
@@ -134,42 +134,22 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
-class Shape:
-    """Properties of a chain, besides its blocks, that determine its functions and memory. `effects`: whether it has
-    any; `corners`: whether it uses the corner engine; `taps`: number of reference samples that are summed; `waiting`:
-    number of delayed drives; the others as in `Variant`."""
-
-    form: Form
-    effects: bool = False
-    corners: bool = False
-    slew: bool = False
-    braked: bool = False
-    quiet: bool = False
-    turning: bool = False
-    taps: int = 0
-    waiting: int = 0
-
-    @classmethod
-    def of(cls, t: ChainTables, form: Form) -> Shape:
-        """The shape of a model with effects."""
-        return cls(
-            form, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
-            bool(t.turning), len(t.tap), t.of("wait").samples,
-        )
-
-
-@dataclass(frozen=True)
 class ChainBlocks:
-    """The blocks of a model with effects: for each operator those in front of the plays and those behind; its clock;
-    and the plays that rub."""
+    """The blocks of a model, none without effects: for each operator those in front of the plays and those behind; its
+    clock; and the plays that rub."""
 
     sides: Mapping[str, tuple[list[NamedBlock], list[NamedBlock]]]
     clocks: list[NamedBlock]
     rubbing: list[NamedBlock | None]
 
     @classmethod
+    def none(cls, operators: Sequence[str]) -> ChainBlocks:
+        """Those of a model without effects."""
+        return cls({op: ([], []) for op in operators}, [], [])
+
+    @classmethod
     def of(cls, t: ChainTables, operators: Sequence[str]) -> ChainBlocks:
-        """The blocks of a model."""
+        """The blocks of a model with effects."""
         from hystgen.compensator.chain import blocks
 
         rubbing = [
@@ -185,21 +165,17 @@ class ChainBlocks:
         return [*before, *after, *(each for each in self.rubbing if each), *self.clocks]
 
 
-def effects(
-    compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[EmittedStage], writer: Writer
-) -> Effects:
-    """Tables and macros of a model's effects; `behind`: its stages of saturation."""
-
-    t, chain = compiled.tables, ChainBlocks.of(compiled.tables, operators)
-    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks plus modes
+def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> Tabled:
+    """Tables and macros of a model's effects, besides those of its stages of saturation."""
+    largest = max(map(chain.blocks, chain.sides), key=len)  # the forward operator has the inverse's blocks plus modes
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "drive samples held in the delay"))
-    if "forward" in operators and t.of("wait").samples:
+    if "forward" in chain.sides and t.of("wait").samples:
         tables.append(form.factors("waited", t.of("wait").share, writer))
-    if "inverse" in operators and len(t.tap):
+    if "inverse" in chain.sides and len(t.tap):
         tables.append(form.factors("tap", t.tap, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
@@ -208,37 +184,21 @@ def effects(
         *form.effects(t),
     ]
     if t.moving.used:
-        moved, numbers_of_plays = form.moving(t, "inverse" in operators, writer)
+        moved, numbers_of_plays = form.moving(t, "inverse" in chain.sides, writer)
         tables, constants = tables + moved, constants + numbers_of_plays
-    return Effects(compiled, tuple(tables), tuple(each for stage in behind for each in stage.arrays), tuple(constants))
+    return tables, constants
 
 
-def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[EmittedStage]) -> Glue:
-    """The glue of a model with effects."""
-    from hystgen.effects.plays import DASHPOT, STRAIGHT
-
-    t, chain = compiled.tables, ChainBlocks.of(compiled.tables, operators)
-    shape = Shape.of(t, form)
-    functions = [
-        _functions(op, shape, *chain.sides[op], behind, chain.clocks, chain.rubbing) for op in operators
-    ]
+def glue(t: Variant, chain: ChainBlocks, form: Form, behind: Sequence[EmittedStage], plays: int) -> Glue:
+    """The glue of a model with effects, or of one without in the loop engine, which is a chain without blocks;
+    `behind`: its stages of saturation."""
+    functions = "\n".join(_functions(op, t, chain, form, behind) for op in chain.sides)
     heated = ["set_temperature"] * ("set_temperature" in t.calls)
     aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
     every = ["settle", "set_offset", *heated, *aged]
-    calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))]}
-    searched = t.moving.used and not t.moving.scanned
-    n = len(t.threshold) - 1
-    kept = n * (t.moving.moves == DASHPOT)
-    bent = t.moving.bends != STRAIGHT
-    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched, bent) for op in operators}
-    return Glue(fields, "\n".join(functions), calls)
-
-
-def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
-    """The glue of a model without effects in the loop engine, which is a chain without blocks."""
-    shape = Shape(form)
-    functions = [_functions(op, shape) for op in operators]
-    return Glue({op: instance(op, shape, (), plays, 0) for op in operators}, "\n".join(functions), {})
+    calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (t.taps > 0))]}
+    fields = {op: instance(op, t, chain.blocks(op), form, plays) for op in chain.sides}
+    return Glue(fields, functions, calls if t.chain else {})
 
 
 _PLAYS = "play 0 is the input of the plays"
@@ -246,21 +206,19 @@ _KEPT = "; the rounding remainder of each follows"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
-def instance(
-    op: str, t: Shape, blocks: Sequence[NamedBlock], plays: int, kept: int, sought: bool = False, bent: bool = False
-) -> list[Field]:
+def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, plays: int) -> list[Field]:
     """The memory of one operator, field by field."""
-    inverse, taps = op == "inverse", t.taps
+    inverse, taps, kept = op == "inverse", t.taps, plays * (t.moves == "dashpot")
     waiting = 0 if inverse else t.waiting
     arrived = Field("fine_t", "drive", "last output of the drive side")
-    answer = "drive" if inverse else "displacement" if t.effects else "output"
+    answer = "drive" if inverse else "displacement" if t.chain else "output"
     length = "" if kept else "HYSTGEN_N_PLAYS + 1"
     searched = [Field("bool", "sought", "a solution has been found since the plays last followed")] * inverse
     return [
         *[Field("real_t", "pending", "drive sent but not yet in the memory")] * inverse,
         Field("real_t", "applied", "last applied drive"),
         *[Field("ramp_t", "reached", "drive at a limited rate")] * t.slew,
-        arrived if t.effects else Field("real_t", "drive", "last applied drive"),
+        arrived if t.chain else Field("real_t", "drive", "last applied drive"),
         *[Field("real_t", "reference", "of the last step"), Field("real_t", "last", _LAST)] * inverse,
         Field("signal_t", "level", "sum of the plays"),
         Field("signal_t", "output", "last output of the output side"),
@@ -281,23 +239,20 @@ def instance(
             Field("unsigned int", "bits", "of the last step"),
         ] * inverse,
         Field("unsigned int", "status"),
-        *([*searched, *t.form.corners(inverse, plays)] if t.corners
+        *([*searched, *form.corners(inverse, plays)] if t.engine == "corners"
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
         *[
             Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS"),
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
-        ] * bent,
-        *[Field("search_t", "search", "for the input of the plays")] * (sought and inverse),
+        ] * t.bent,
+        *[Field("search_t", "search", "for the input of the plays")] * (inverse and bool(t.bends)),
     ]
 
 
-def _functions(
-    op: str, t: Shape, before: Sequence[NamedBlock] = (), after: Sequence[NamedBlock] = (),
-    behind: Sequence[EmittedStage] = (), clocks: Sequence[NamedBlock] = (), rubbing: Sequence[NamedBlock | None] = (),
-) -> str:
+def _functions(op: str, t: Variant, chain: ChainBlocks, form: Form, behind: Sequence[EmittedStage]) -> str:
     """The functions of one operator that name its blocks."""
-    inverse = op == "inverse"
+    inverse, (before, after), clocks = op == "inverse", chain.sides[op], chain.clocks
     quiet, turning = inverse and t.quiet, inverse and t.turning
     settled = absorbed = seen = ""
     if turning:
@@ -316,15 +271,15 @@ def _functions(
 
     def offset(lead: str) -> str:
         drifts = "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
-        return f"(HYSTGEN_OUTPUT_OFFSET + self->offset{drifts})" if t.effects else "HYSTGEN_OFFSET"
+        return f"(HYSTGEN_OUTPUT_OFFSET + self->offset{drifts})" if t.chain else "HYSTGEN_OFFSET"
 
     return template(
         "chain.c.j2", op=op, inverse=inverse, before=before, after=after, behind=behind, clocks=clocks,
-        rubbing=[each for each in rubbing if each], kinds=kinds,
+        rubbing=[each for each in chain.rubbing if each], kinds=kinds,
         turning=turning, quiet=quiet, settled=settled, absorbed=absorbed, seen=seen, offset=offset,
         solve="braked" if t.braked else "solve", counted="" if quiet else "const ",
         lead=f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and t.taps else "0",
-        displacing=t.form.apart if behind or clocks else "static",
-        travelling=t.form.apart if clocks or any(block.kind.name in moved for block in after) else "static",
-        warming=["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in rubbing],
+        displacing=form.apart if behind or clocks else "static",
+        travelling=form.apart if clocks or any(block.kind.name in moved for block in after) else "static",
+        warming=["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in chain.rubbing],
     )

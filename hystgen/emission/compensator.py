@@ -11,17 +11,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-from hystgen.chain.static import StaticModel
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime
 from hystgen.emission.options import Options
 from hystgen.emission.text import WIDTH, Number, braces, comment_text, constant, literal, operand, structure, table
-from hystgen.parameters.files import Parameters
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
+    from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
 """A macro of a model: its name without the model's prefix, its value, and a comment."""
@@ -81,18 +80,14 @@ class Writer:
         """A writer for types that the model itself defines."""
         return Writer(self.name, self.name)
 
-    def constant(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> ConstantTable:
-        """A constant with these lines between its braces, on one line if it fits, below a comment `words`."""
-        return self._table(own, words + constant(self._declared(kind, own, sizes), lines), [(kind, math.prod(sizes))])
-
     def line(self, kind: str, own: str, values: str, *sizes: int) -> ConstantTable:
         """A constant on one line."""
         text = f"static const {self._declared(kind, own, sizes)} = {{{values}}};\n"
         return self._table(own, text, [(kind, math.prod(sizes))])
 
-    def entries(self, kind: str, own: str, entries: Iterable[str], words: str = "") -> ConstantTable:
+    def entries(self, kind: str, own: str, entries: Iterable[str]) -> ConstantTable:
         """A structure with these entries, on as few lines as they need."""
-        return self.constant(kind, own, filled(entries).splitlines(), words=words)
+        return self._table(own, constant(self._declared(kind, own, ()), filled(entries).splitlines()), [(kind, 1)])
 
     def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> ConstantTable:
         """An array of structures, one per line; `last`: text after the last one."""
@@ -152,6 +147,9 @@ def _entry(letter: str, rest: Iterator[Number]) -> str:
     return literal(next(rest))
 
 
+Tabled: TypeAlias = tuple[list[ConstantTable], list[Macro]]
+"""Tables and macros of effects, or of plays that an effect moves or bends."""
+
 AnyTables: TypeAlias = "Tables | FixedTables | ChainTables"
 
 
@@ -170,15 +168,13 @@ class Errors:
 class Numbers:
     """The numbers of a model in an arithmetic.
 
-    `drive`, `output`: their limits; `macros`: for use by functions; `plays`: tables with an entry for each play, and
-    the start memory; `beside`: other tables; `stages`: of the memoryless part, if functions call them one by one;
-    `lsb`: physical units per code of drive and output, if there are codes; `precision`: sentences about codes and their
-    error; `envelopes`: whether an envelope limits its argument; the others as in `hystgen.emission.runtime.Variant`.
+    `macros`: for use by functions; `plays`: tables with an entry for each play, and the start memory; `beside`: other
+    tables; `stages`: of the memoryless part, if functions call them one by one; `lsb`: physical units per code of drive
+    and output, if there are codes; `precision`: sentences about codes and their error; `envelopes`: whether an envelope
+    limits its argument; the others as in `hystgen.emission.runtime.Variant`.
     """
 
     tables: AnyTables
-    drive: tuple[str, str]
-    output: tuple[str, str]
     macros: tuple[Macro, ...]
     plays: tuple[ConstantTable, ...]
     beside: tuple[ConstantTable, ...]
@@ -198,16 +194,6 @@ class Numbers:
         return len(tables.start) > 1
 
 
-@dataclass(frozen=True)
-class Effects:
-    """The C of a model's effects besides its plays: tables, tables of saturation, and macros."""
-
-    compiled: Compiled
-    tables: tuple[ConstantTable, ...]
-    behind: tuple[ConstantTable, ...]
-    macros: tuple[Macro, ...]
-
-
 class Form(ABC):
     """How one kind of arithmetic writes the numbers of a model, and how it describes them if it has codes.
 
@@ -223,12 +209,13 @@ class Form(ABC):
     settings: ClassVar[Mapping[str, str]]
 
     @abstractmethod
-    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
+    def numbers(self, model: Model, options: Options, writer: Writer) -> Numbers:
         """The numbers of a model without effects."""
 
     @abstractmethod
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
+        self, model: Model, compiled: Compiled, effects: Tabled, stages: Sequence[EmittedStage], options: Options,
+        writer: Writer,
     ) -> Numbers:
         """The numbers of a model with effects, with these stages of saturation behind the plays."""
 
@@ -237,7 +224,7 @@ class Form(ABC):
         """The stages of saturation."""
 
     @abstractmethod
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
@@ -281,12 +268,6 @@ class Form(ABC):
         return ""
 
 
-def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The least and the largest drive, and the same for the output, in C."""
-    ends = [operand(x) for x in (*numbers.limits.drive[0], *numbers.limits.output[0])]
-    return (ends[0], ends[1]), (ends[2], ends[3])
-
-
 def macros(numbers: Tables | FixedTables) -> list[Macro]:
     """Macros that every arithmetic has."""
     ends = numbers.limits
@@ -316,13 +297,6 @@ def pointers(
 ) -> ConstantTable:
     """Pointers to the loop engine's tables."""
     return writer.entries("tables_t", f"{whose}_tables", [*places, str(len(numbers.threshold) - 1)])
-
-
-def units(parameters: Parameters) -> tuple[str, str]:
-    """Units of drive and output, as written after a number."""
-    words = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
-    drive, output = (f" {unit}" if unit else "" for unit in words)
-    return drive, output
 
 
 def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> ConstantTable:
@@ -398,8 +372,7 @@ class UnitTexts:
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain."""
 
-    parameters: Parameters
-    cascade: StaticModel
+    model: Model
     options: Options
     names: Names
     family: runtime.Family
@@ -416,11 +389,9 @@ class EmittedModel:
         whole = float(limits.drive.high[0]) - float(limits.drive.low[0])
         if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
             return None
-        from hystgen.chain.chain import Chain
         from hystgen.compensator.chain.measured import measured
 
-        chain, how = Chain(self.cascade, self.parameters.model.effects), self.parameters.emit.compensation
-        return measured(self.compiled, chain, how)
+        return measured(self.compiled, self.model.chain, self.model.parameters.emit.compensation)
 
     @property
     def kernel_facts(self) -> frozenset[str]:
@@ -431,15 +402,15 @@ class EmittedModel:
     @property
     def units(self) -> UnitTexts:
         """Units of drive and output."""
-        units = self.parameters.units
+        units = self.model.parameters.units
         return UnitTexts(comment_text(units.input), comment_text(units.output))
 
     @property
-    def calls(self) -> dict[str, list[str]]:
+    def calls(self) -> Mapping[str, Sequence[str]]:
         """By operator, the functions that a model with effects has in addition to those of every model."""
-        return {op: list(calls) for op, calls in self.glue.calls.items()} if self.glue else {}
+        return self.glue.calls if self.glue else {}
 
     @property
     def corners(self) -> int:
         """Number of corners that the corner engine keeps, 0 for the loop engine."""
-        return self.family.corners(self.cascade.pi.n) if self.options.engine == "corners" else 0
+        return self.family.corners(self.model.cascade.pi.n) if self.options.engine == "corners" else 0

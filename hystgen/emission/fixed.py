@@ -11,33 +11,31 @@ from hystgen.compensator import fixed_tables
 from hystgen.compensator.layout import FixedTables
 from hystgen.emission.compensator import (
     ConstantTable,
-    Effects,
     EmittedStage,
     Errors,
     Field,
     Form,
     Macro,
     Numbers,
+    Tabled,
     Writer,
     drives,
     entries,
-    limits,
     macros,
     pointers,
-    units,
 )
 from hystgen.emission.options import Options
-from hystgen.emission.text import Number, literal, operand
+from hystgen.emission.text import Number, comment_text, literal, operand
 from hystgen.front.curve import FORWARD, INVERSE
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
-    from hystgen.compensator.chain.layout import ChainTables, Codes
+    from hystgen.compensator.chain.layout import ChainTables, Codes, Compiled
     from hystgen.compensator.chain.moving import FixedMovingTables
     from hystgen.effects.bend import Bends
+    from hystgen.model import Model
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
            ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))
@@ -68,28 +66,24 @@ class FixedForm(Form):
     def quantity(self, words: str, macro: str, unit: str) -> str:
         return f"{words}, in codes of {macro}{f' {unit}' if unit else ''}"
 
-    def unless_held(self, call: str) -> str:
-        return ""
-
     def between(self, low: Number, high: Number, part: float) -> Number:
         return int(low) + (int(high) - int(low)) * part
 
-    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
-        emit = parameters.emit
+    def numbers(self, model: Model, options: Options, writer: Writer) -> Numbers:
+        cascade, emit = model.cascade, model.parameters.emit
         t, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
         ends = t.limits
-        drive, output = limits(t)
         curves, counts = _curves(t, options, writer)
         rounding = form.inverse_rounding if options.inverse else None
         return Numbers(
-            t, drive, output, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
+            t, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
             (*_pointers(t, options, writer), *curves),
             _errors(options, (form.forward_error, form.inverse_error, rounding)),
             fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends.fine[0]) > 0,
             saturates=bool(ends.saturated[0] == ends.code_max[0]),
             lsb=(float(form.drive_lsb), float(form.output_lsb)),
             precision=(
-                *_precision(parameters, form, " on the same branch" * bool(t.branches)),
+                *_precision(model, form, " on the same branch" * bool(t.branches)),
                 f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 "
                 "bits hold 2^63),",
                 f"    inputs of plays between {ends.play.low[0]} and {ends.play.high[0]}, "
@@ -98,27 +92,26 @@ class FixedForm(Form):
         )
 
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
+        self, model: Model, compiled: Compiled, effects: Tabled, stages: Sequence[EmittedStage], options: Options,
+        writer: Writer,
     ) -> Numbers:
-
-        compiled, tables, codes = effects.compiled, effects.compiled.tables, effects.compiled.codes
+        tables, codes, (arrays, constants) = compiled.tables, compiled.codes, effects
         plays: FixedTables = tables.plays
         assert codes is not None
         curves, counts = _curves(plays, options, writer)
-        drive, output = limits(tables)
         where = f" where {codes.condition}" if codes.condition else " on the same branch" * bool(plays.branches)
         return Numbers(
-            tables, drive, output, (*macros(plays), *_macros(plays), *counts, *effects.macros),
+            tables, (*macros(plays), *_macros(plays), *counts, *constants),
             tuple(_plays(plays, options, writer, chain=True)),
-            (*curves, *effects.tables, *_pointers(plays, options, writer), *_relaxing(tables, options, writer),
-             *effects.behind),
+            (*curves, *arrays, *_pointers(plays, options, writer), *_relaxing(tables, options, writer),
+             *(each for stage in stages for each in stage.arrays)),
             _errors(options, (codes.forward_error, codes.inverse_error, codes.inverse_rounding), codes.condition),
             fronts=bool(plays.fronts),
             envelopes=_envelopes(compiled.static) or any(one.kind == "bend" for one in stages),
             finer=bool(tables.number.arriving_bits[0]), saturates=True,
             lsb=(float(codes.drive_lsb), float(codes.output_lsb)),
             precision=(
-                *_precision(parameters, codes, where),
+                *_precision(model, codes, where),
                 f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
                 f"{tables.number.level_bits[0]} bits below an output code; states of effects below 2^62 (64 bits "
                 "hold 2^63)",
@@ -128,7 +121,7 @@ class FixedForm(Form):
     def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
         return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
         from hystgen.compensator.chain import moving
 
         plays: FixedMovingTables = t.moving
@@ -152,7 +145,7 @@ class FixedForm(Form):
             return arrays, numbers
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
         arrays = [
-            _factors(name, rows, writer) for name, rows in zip(names, (plays.first, plays.second), strict=False)
+            self.factors(name, rows, writer) for name, rows in zip(names, (plays.first, plays.second), strict=False)
         ]
         if plays.moves == moving.DASHPOT:
             rows = [entries(row, "rcrr") for row in plays.yields]
@@ -204,7 +197,7 @@ class FixedForm(Form):
         return int(t.number.drive_bits[0])
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
-        return _factors(own, rows, writer)
+        return writer.lines("factor_t", own, [f"    {entries(row, 'f')}," for row in rows], len(rows))
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [
@@ -218,10 +211,6 @@ class FixedForm(Form):
 def _factor(pair: Iterable[int]) -> str:
     """A factor without its braces."""
     return entries(pair, "f")[1:-1]
-
-
-def _factors(own: str, rows: Reals, writer: Writer) -> ConstantTable:
-    return writer.lines("factor_t", own, [f"    {entries(row, 'f')}," for row in rows], len(rows))
 
 
 def _errors(options: Options, bounds: tuple[float, float | None, float | None], condition: str = "") -> Errors:
@@ -240,9 +229,10 @@ def _envelopes(cascade: StaticModel) -> bool:
     return any(isinstance(stage, TanhEnvelope) for stage in cascade.stages)
 
 
-def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
+def _precision(model: Model, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
     """The size of codes, and the error bounds on answers against the exact model."""
-    drive, output = units(parameters)
+    units = model.parameters.units
+    drive, output = (f" {comment_text(unit)}".rstrip() for unit in (units.input, units.output))
     drive_lsb, output_lsb = float(form.drive_lsb), float(form.output_lsb)
     forward, inverse = form.forward_error, form.inverse_rounding
     found = [

@@ -8,38 +8,35 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from hystgen.chain.static import StaticModel
 from hystgen.compensator import float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.layout import Tables
 from hystgen.emission.compensator import (
     ConstantTable,
-    Effects,
     EmittedStage,
     Errors,
     Field,
     Form,
-    Macro,
     Numbers,
+    Tabled,
     Writer,
     drives,
     entries,
     filled,
-    limits,
     macros,
     pointers,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.text import Number, literal, operand
 from hystgen.front.stage import StageTables
-from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Start
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
-    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.moving import MovingTables
+    from hystgen.model import Model
 
 COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
            ("lift", "lift", False))
@@ -70,33 +67,33 @@ class FloatingForm(Form):
     def between(self, low: Number, high: Number, part: float) -> Number:
         return low + (high - low) * type(high)(part)
 
-    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
-        t = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
-        bounds = error_bounds(cascade, options.arithmetic, options.engine)
+    def numbers(self, model: Model, options: Options, writer: Writer) -> Numbers:
+        t = float_tables.build_float(model.cascade, options.arithmetic, options.engine, True, True)
+        bounds = error_bounds(model.cascade, options.arithmetic, options.engine)
         errors = _errors(t, options, (bounds.forward, bounds.inverse, bounds.rounding))
         return _numbers(t, errors, options, writer, chain=False)
 
     def chained(
-        self, parameters: Parameters, effects: Effects, stages: Sequence[EmittedStage], options: Options, writer: Writer
+        self, model: Model, compiled: Compiled, effects: Tabled, stages: Sequence[EmittedStage], options: Options,
+        writer: Writer,
     ) -> Numbers:
         from hystgen.compensator.chain.bounds import chain_bounds, condition
 
-        tables = effects.compiled.tables
-        bounds = chain_bounds(effects.compiled, options.arithmetic)
+        tables, (arrays, constants) = compiled.tables, effects
+        bounds = chain_bounds(compiled, options.arithmetic)
         errors = _errors(tables, options, (bounds.forward, bounds.inverse, bounds.rounding))
         plays = _numbers(tables.plays, errors, options, writer, chain=True)
-        drive, output = limits(tables)
         return dataclasses.replace(
-            plays, tables=tables, drive=drive, output=output, macros=(*plays.macros, *effects.macros),
-            beside=(*plays.beside, *effects.tables, *effects.behind),
-            errors=dataclasses.replace(errors, condition=condition(effects.compiled)),
+            plays, tables=tables, macros=(*plays.macros, *constants),
+            beside=(*plays.beside, *arrays, *(each for stage in stages for each in stage.arrays)),
+            errors=dataclasses.replace(errors, condition=condition(compiled)),
             envelopes=plays.envelopes or any(one.kind == "envelope" for one in stages),
         )
 
     def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
         return [_stage(t.behind, j, f"behind_{j + 1}", options, writer) for j in range(len(t.behind.stage_kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[ConstantTable], list[Macro]]:
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
         from hystgen.compensator.chain import moving
 
         plays: MovingTables = t.moving
@@ -164,9 +161,8 @@ def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain:
         read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or options.inverse}
         places = [read.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
         beside = [pointers(t, places, writer), *beside]
-    drive, output = limits(t)
     return Numbers(
-        t, drive, output, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
+        t, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
         envelopes=any(stage.kind == "envelope" for stage in stages), stages=tuple(stages),
     )
 

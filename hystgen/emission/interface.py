@@ -6,7 +6,7 @@ import re
 import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
@@ -84,7 +84,7 @@ def reading(one: EmittedModel) -> list[str]:
     compiled = one.compiled
     if compiled is None or not one.options.inverse:
         return []
-    return [*_averaged(compiled), *_branches(compiled, one.parameters), *_quiet(one, compiled)]
+    return [*_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
 
 
 def _averaged(compiled: Compiled) -> list[str]:
@@ -140,7 +140,7 @@ def _quiet(one: EmittedModel, compiled: Compiled) -> list[str]:
 
 def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str]:
     """The lines of a header's banner; `notes`: how the inverse reads references, and why it may be of little use."""
-    parameters, options = one.parameters, one.options
+    parameters, options = one.model.parameters, one.options
     about = comment_text(parameters.description)
     avr = [] if estimate.avr is None else [
         f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in total, "
@@ -181,9 +181,9 @@ def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str
 
 
 def _model(one: EmittedModel) -> str:
-    n = one.cascade.pi.n
-    kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.cascade.stages]
-    names = dict.fromkeys(effect.name for effect in one.parameters.model.effects)
+    n = one.model.cascade.pi.n
+    kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.model.cascade.stages]
+    names = dict.fromkeys(effect.name for effect in one.model.parameters.model.effects)
     behind = f" behind {', '.join(kinds)}" if kinds else ""
     effects = f"; effects {', '.join(names)}" if names else ""
     return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
@@ -235,19 +235,20 @@ def limits(one: EmittedModel) -> list[str]:
     numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
     bound, suffix = "against the double model, ", form.suffix
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
-    found: list[Macro] = [("N_PLAYS", str(one.cascade.pi.n), ""), *_timing(one)]
+    found: list[Macro] = [("N_PLAYS", str(one.model.cascade.pi.n), ""), *_timing(one)]
     words = ("physical units per code; code 0 is 0", "")
     found += [
         (f"{side}_LSB", literal(lsb), comment)
         for side, lsb, comment in zip(("DRIVE", "OUTPUT"), numbers.lsb, words, strict=False)
     ]
+    ends = numbers.tables.limits
     found += [
-        ("DRIVE_MIN", numbers.drive[0], drive),
-        ("DRIVE_MAX", numbers.drive[1], ""),
-        ("OUTPUT_MIN", numbers.output[0], f"{output}, over every drive history in range"),
-        ("OUTPUT_MAX", numbers.output[1], ""),
+        ("DRIVE_MIN", operand(ends.drive.low[0]), drive),
+        ("DRIVE_MAX", operand(ends.drive.high[0]), ""),
+        ("OUTPUT_MIN", operand(ends.output.low[0]), f"{output}, over every drive history in range"),
+        ("OUTPUT_MAX", operand(ends.output.high[0]), ""),
     ]
-    if one.options.forward:
+    if "forward" in one.options.operators:
         found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
     branch, condition = conditions(one)
     if one.options.inverse:
@@ -267,7 +268,7 @@ def limits(one: EmittedModel) -> list[str]:
 
 def _timing(one: EmittedModel) -> list[Macro]:
     """Macros about time: the sample time, and for a model with effects its consequences."""
-    kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
+    kind, period, compiled = one.family.arithmetic.real, one.model.parameters.sample_time, one.compiled
     found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, between steps")]
     if compiled is None:
         return found
@@ -306,57 +307,43 @@ def status(one: EmittedModel) -> list[str]:
 
 # Calls
 
-_FIRST = "after init; at any time"
-ORDER = {
-    "init": "before every other call; may be repeated at any time",
-    "reset": _FIRST,
-    "step": "after init; once every sample time, from one context",
-    "commit": "after a step and before the next one, any number of times; before the first step it sets a first drive",
-    "status": _FIRST,
-    "push": "after init and before the first step",
-    "settle": _FIRST,
-    "set_offset": _FIRST,
-    "set_temperature": _FIRST,
-    "set_gain": _FIRST,
-    "travel": _FIRST,
-    "set_travel": "after init and before the first step, or at any time",
-    "expected": "after a step, a commit or settle",
-    "correct": "after a step, when the sensor's value belongs to the drive that was applied before that step",
-}
-"""When a call may be made."""
 
-_FEW = "a few operations, less than a step"
-COSTS = {
-    "init": "one pass over the plays",
-    "reset": "that of init and of a step",
-    "commit": "a few comparisons; the next step absorbs the drive",
-    "status": "one load and one store",
-    "push": "less than a step",
-    "settle": "at most that of two steps",
-    "set_offset": _FEW,
-    "set_temperature": _FEW,
-    "set_gain": _FEW,
-    "travel": "one load",
-    "set_travel": _FEW,
-    "expected": _FEW,
-    "correct": _FEW,
-}
-"""What a call costs; the cost of a step is counted for each model."""
+class CallFacts(NamedTuple):
+    """What the documentation of a call says besides its arguments: when the call may be made, what it costs (empty if
+    that is counted for each model), and the status bits that it may set, if the model has them."""
 
-_ENTERED = ("INPUT_CLAMPED", "HELD")
-_SET = ("LIMITED_SETTING", "HELD")
-BITS = {
-    "step": (*_ENTERED, "OUTPUT_CLAMPED", "DOMAIN", "SLEW_LIMITED"),
-    "commit": _ENTERED,
-    "push": (*_ENTERED, "DOMAIN"),
-    "settle": _ENTERED,
-    "set_offset": _SET,
-    "set_temperature": _SET,
-    "set_gain": _SET,
-    "set_travel": _SET,
-    "correct": _SET,
+    order: str
+    cost: str
+    bits: tuple[str, ...] = ()
+
+
+_FIRST, _FEW = "after init; at any time", "a few operations, less than a step"
+_ENTERED, _SET = ("INPUT_CLAMPED", "HELD"), ("LIMITED_SETTING", "HELD")
+CALLS = {
+    "init": CallFacts("before every other call; may be repeated at any time", "one pass over the plays"),
+    "reset": CallFacts(_FIRST, "that of init and of a step"),
+    "step": CallFacts(
+        "after init; once every sample time, from one context", "",
+        (*_ENTERED, "OUTPUT_CLAMPED", "DOMAIN", "SLEW_LIMITED"),
+    ),
+    "commit": CallFacts(
+        "after a step and before the next one, any number of times; before the first step it sets a first drive",
+        "a few comparisons; the next step absorbs the drive", _ENTERED,
+    ),
+    "status": CallFacts(_FIRST, "one load and one store"),
+    "push": CallFacts("after init and before the first step", "less than a step", (*_ENTERED, "DOMAIN")),
+    "settle": CallFacts(_FIRST, "at most that of two steps", _ENTERED),
+    "set_offset": CallFacts(_FIRST, _FEW, _SET),
+    "set_temperature": CallFacts(_FIRST, _FEW, _SET),
+    "set_gain": CallFacts(_FIRST, _FEW, _SET),
+    "travel": CallFacts(_FIRST, "one load"),
+    "set_travel": CallFacts("after init and before the first step, or at any time", _FEW, _SET),
+    "expected": CallFacts("after a step, a commit or settle", _FEW),
+    "correct": CallFacts(
+        "after a step, when the sensor's value belongs to the drive that was applied before that step", _FEW, _SET
+    ),
 }
-"""Status bits that a call may set, if the model has them."""
+"""The calls of the interface."""
 
 _PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
 
@@ -366,7 +353,8 @@ def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterat
     for piece in pieces:
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
-        words = " ".join(re.sub(r"^ *\* ?", " ", line) for line in _brief(piece.text).splitlines())
+        brief = piece.text.partition("/*")[2].partition("*/")[0]
+        words = " ".join(re.sub(r"^ *\* ?", " ", line) for line in brief.splitlines())
         call, op = found["call"], found["op"]
         names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
@@ -374,16 +362,12 @@ def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterat
         if found["answer"] != "void":
             lines.append(("@return", _answer(call, op, one)))
         lines += [
-            ("@pre", ORDER[call]),
+            ("@pre", CALLS[call].order),
             ("@note", f"Status bits: {_bits(call, op, one)}"),
             ("@note", f"Cost: {_cost(call, op, one, cost)}"),
         ]
         above = "\n".join(["/**", *(line for mark, text in lines for line in _line(mark, text)), " */"])
         yield Piece(piece.name, f"{above}\n{piece.code.lstrip()}\n", piece.uses)
-
-
-def _brief(text: str) -> str:
-    return text.partition("/*")[2].partition("*/")[0]
 
 
 def _line(mark: str, text: str) -> list[str]:
@@ -439,7 +423,7 @@ def _bits(call: str, op: str, one: EmittedModel) -> str:
         "DOMAIN": op == "inverse" and one.numbers.envelopes,
         "SLEW_LIMITED": one.variant.slew,
     }
-    found = [f"{one.names.NAME}_STATUS_{bit}" for bit in BITS.get(call, ()) if there.get(bit, True)]
+    found = [f"{one.names.NAME}_STATUS_{bit}" for bit in CALLS[call].bits if there.get(bit, True)]
     return ", ".join(found) or "none"
 
 
@@ -448,7 +432,7 @@ def _cost(call: str, op: str, one: EmittedModel, cost: Cost) -> str:
         return f"at most {dict(cost.worst_case)[op]}"
     if call == "commit" and one.corners and not one.variant.chain:
         return "at most that of a step"
-    return COSTS[call]
+    return CALLS[call].cost
 
 
 # Words

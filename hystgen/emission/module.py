@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,53 +16,39 @@ from hystgen.emission.cost import Cost, Data
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
 from hystgen.emission.text import define, fit
-from hystgen.parameters.files import Parameters, parameters_sha256
+from hystgen.parameters.files import parameters_sha256
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
+    from hystgen.model import Model
 
 WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
 
 
-def compensator(parameters: Parameters, cascade: StaticModel, options: Options) -> EmittedModel:
+def compensator(model: Model, options: Options) -> EmittedModel:
     """The compensator of a model. Raises FormatError."""
-    compiled = _compiled(parameters, cascade, options)
+    compiled = model.compiled(options.arithmetic, options.engine) if model.effects else None
     whole = runtime.FAMILIES[options.arithmetic]
-    family = dataclasses.replace(
-        whole, chain=compiled is not None, loop=compiled is None and options.engine == "loop"
-    )
+    loop = options.engine == "loop"
+    family = dataclasses.replace(whole, chain=compiled is not None, loop=compiled is None and loop)
     form: Form = importlib.import_module(f"hystgen.emission.{family.form}").FORM
-    name = parameters.name
-    names = Names(name, f"hystgen_{family.bits}" if options.layout == "shared-runtime" else name)
-    writer = Writer(name, names.rt)
+    names = Names(model.name, f"hystgen_{family.bits}" if options.layout == "shared-runtime" else model.name)
+    writer = Writer(model.name, names.rt)
     glue: Glue | None = None
     if compiled:
         behind = form.behind(compiled.tables, options, writer)
-        effects = chain.effects(compiled, options.operators, form, behind, writer.own)
-        numbers = form.chained(parameters, effects, behind, options, writer)
-        glue = chain.glue(compiled, options.operators, form, behind)
+        blocks = chain.ChainBlocks.of(compiled.tables, options.operators)
+        effects = chain.effects(compiled.tables, blocks, form, writer.own)
+        numbers = form.chained(model, compiled, effects, behind, options, writer)
     else:
-        numbers = form.numbers(parameters, cascade, options, writer)
-        if options.engine == "loop":
-            glue = chain.alone(options.operators, cascade.pi.n, form)
-    variant = _variant(options, family, cascade, numbers, compiled)
-    return EmittedModel(parameters, cascade, options, names, family, variant, form, numbers, compiled, glue)
-
-
-def _compiled(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
-    """The numbers of a model with effects; None for a model without effects."""
-    effects, emit = parameters.model.effects, parameters.emit
-    if not effects:
-        return None
-    from hystgen.chain.chain import Chain
-    from hystgen.compensator.chain import tables as chain_tables
-
-    assert parameters.sample_time is not None, "emit_options asks for it"
-    lsb = (emit.drive_lsb, emit.output_lsb)
-    return chain_tables.build(
-        Chain(cascade, effects), options.arithmetic, parameters.sample_time, emit.compensation, lsb, options.engine
-    )
+        numbers = form.numbers(model, options, writer)
+    variant = _variant(options, family, model.cascade, numbers, compiled)
+    if compiled:
+        glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
+    elif loop:
+        glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
+    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue)
 
 
 def _variant(
@@ -78,7 +64,7 @@ def _variant(
     moves, bends = chain.plays(t)
     return dataclasses.replace(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
-        waits=t.number_of("wait") > 0, previews=len(t.tap) > 0, ages="travel" in t.calls, moves=moves, bends=bends,
+        waiting=t.of("wait").samples, taps=len(t.tap), calls=frozenset(t.calls), moves=moves, bends=bends,
     )
 
 
@@ -200,32 +186,22 @@ class Module:
     reading: Sequence[str]
     doubts: Sequence[str]
 
-    @property
-    def name(self) -> str:
-        """The model's name."""
-        return self.compensator.names.name
 
-    @property
-    def calls(self) -> Mapping[str, Sequence[str]]:
-        """For each operator, its functions beyond those that every model has."""
-        return self.compensator.calls
-
-
-def of(parameters: Parameters, cascade: StaticModel, options: Options, sha256: str = "") -> Module:
-    """The module of a model; `sha256`: hash of the parameters in the file, by default the hash of `parameters`.
+def of(model: Model, options: Options, sha256: str = "") -> Module:
+    """The module of a model; `sha256`: hash of the parameters in the file, by default the hash of the model's.
 
     Raises FormatError.
     """
-    one = compensator(parameters, cascade, options)
+    one = compensator(model, options)
     made = composed(one)
     dynamic: list[str] = []
     if one.compiled and options.inverse:
         from hystgen.emission import doubts
 
-        dynamic = doubts.found(parameters, one.compiled)
+        dynamic = doubts.found(model.parameters, one.compiled)
     return Module(
-        one, made, cost.estimate(cascade, options, one.numbers.tables, made.data),
-        sha256 or parameters_sha256(parameters), interface.reading(one), [*dynamic, *interface.unbounded(one)],
+        one, made, cost.estimate(model.cascade, options, one.numbers.tables, made.data),
+        sha256 or parameters_sha256(model.parameters), interface.reading(one), [*dynamic, *interface.unbounded(one)],
     )
 
 
@@ -233,7 +209,7 @@ def files(module: Module) -> dict[str, str]:
     """File names and their ASCII text."""
     one, made = module.compensator, module.code
     name, options, family = one.names.name, one.options, one.family
-    command = interface.command(one.parameters, options)
+    command = interface.command(one.model.parameters, options)
     whole = implementation(one, made)
     single, source = options.layout == "single-header", f"{name}.c"
     shared = options.layout == "shared-runtime"

@@ -44,11 +44,6 @@ class Options:
         return ("forward", "inverse") if self.operator == "both" else (self.operator,)
 
     @property
-    def forward(self) -> bool:
-        """Whether the forward operator is included."""
-        return self.operator in ("forward", "both")
-
-    @property
     def inverse(self) -> bool:
         """Whether the inverse operator is included."""
         return self.operator in ("inverse", "both")

@@ -14,7 +14,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar
 
 import jinja2
@@ -39,6 +38,8 @@ FLOAT_KERNELS = (
 )
 CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
 """The types of effects."""
+CORNER_STATE = "compensator/corners/state.h"
+"""The types of both instances in engine corners without effects."""
 HELPERS = ("arithmetic/factors.c", "effects/gains.c")
 """Functions that several effects call, in every arithmetic."""
 SIGNALS = {
@@ -142,9 +143,17 @@ class Family(ABC):
         """Whether conversions to the type of inputs and answers are kept."""
         return False
 
-    @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
         """What replaces the storage-class words before functions in this arithmetic, with engine corners or loop."""
+        fixed = self.kind == "fixed"
+        apart = {
+            "IN_FLOAT_CORNERS": corners and not fixed, "BUT_IN_FLOAT_LOOP": corners or fixed, "IN_FLOAT": not fixed,
+            "IN_FIXED": fixed, "IN_FIXED_BLOCK": fixed, "IN_FIXED_CHAIN": fixed and self.chain, "IN_CHAIN": self.chain,
+        }
+        otherwise = {"IN_FIXED": "static inline ", "IN_FIXED_CHAIN": "static inline "}
+        words = {at: APART if holds else otherwise.get(at, "static ") for at, holds in apart.items()}
+        found = {f"HYSTGEN_APART_{at} ": word for at, word in words.items()}
+        return found | {"HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL " if fixed else "HYSTGEN_API "}
 
     def corners(self, plays: int) -> int:
         """Number of corners that the corner engine keeps for this many plays."""
@@ -184,10 +193,6 @@ class Family(ABC):
         return ("arithmetic/soft_float.h",) if "_SOFT_FLOAT" in kernels else ()
 
 
-def _apart(holds: bool, otherwise: str = "static ") -> str:
-    return APART if holds else otherwise
-
-
 class FloatFamily(Family):
     """Floating point: one type for every number."""
 
@@ -204,18 +209,6 @@ class FloatFamily(Family):
 
     def corners(self, plays: int) -> int:
         return plays + 1
-
-    def storage(self, corners: bool) -> dict[str, str]:
-        return {
-            "HYSTGEN_APART_IN_FLOAT_CORNERS ": _apart(corners),
-            "HYSTGEN_APART_IN_FIXED_CHAIN ": "static inline ",
-            "HYSTGEN_APART_IN_FIXED_BLOCK ": "static ",
-            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
-            "HYSTGEN_APART_IN_FIXED ": "static inline ",
-            "HYSTGEN_APART_IN_FLOAT ": APART,
-            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": _apart(corners),
-            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_API ",
-        }
 
 
 class FixedFamily(Family):
@@ -235,18 +228,6 @@ class FixedFamily(Family):
     def casts(self) -> bool:
         return self.loop
 
-    def storage(self, corners: bool) -> dict[str, str]:
-        return {
-            "HYSTGEN_APART_IN_FLOAT_CORNERS ": "static ",
-            "HYSTGEN_APART_IN_FIXED_CHAIN ": _apart(self.chain, "static inline "),
-            "HYSTGEN_APART_IN_FIXED_BLOCK ": APART,
-            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
-            "HYSTGEN_APART_IN_FIXED ": APART,
-            "HYSTGEN_APART_IN_FLOAT ": "static ",
-            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": APART,
-            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL ",
-        }
-
 
 FAMILIES: dict[str, Family] = {
     **{name: FloatFamily(each) for name, each in FLOATING.items()},
@@ -262,8 +243,8 @@ class Variant:
     signals in front of them, are finer than codes; `saturates`: output codes are limited; `start_list`: each play
     starts at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind the
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
-    `waits`: it has a delay; `previews`: references are summed; `ages`: it has a gain that depends on the travel;
-    `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
+    `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
+    add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
     """
 
     engine: str
@@ -278,9 +259,9 @@ class Variant:
     braked: bool = False
     quiet: bool = False
     turning: bool = False
-    waits: bool = False
-    previews: bool = False
-    ages: bool = False
+    waiting: int = 0
+    taps: int = 0
+    calls: frozenset[str] = frozenset()
     moves: str = ""
     bends: str = ""
 
@@ -293,25 +274,24 @@ class Variant:
     @property
     def facts(self) -> frozenset[str]:
         """Facts about the model, besides those of its arithmetic."""
-        bent = self.bends not in ("", "none")
         found = {
             "CORNERS": self.engine == "corners", "START_LIST": self.start_list,
             "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
-            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
+            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waiting, "PREVIEW": self.taps,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
-            "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
-            "MOVES_APART": bent and self.moves in self.family.moves_apart,
+            "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre",
+            "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 
     @property
-    def state(self) -> str:
-        """The header with the types of both instances in engine corners without effects."""
-        return "compensator/corners/state.h"
+    def bent(self) -> bool:
+        """Whether plays are bent."""
+        return self.bends not in ("", "none")
 
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
@@ -342,7 +322,7 @@ class Variant:
         signals = (*files("limits"), *entered, f"{chain}signals.c", *brake)
         start = (*("compensator/loop_start.c",) * loops, f"{chain}chain_start.c")
         settings = (f"{chain}settings.c",) if self.chain else ()
-        travel = files("calls") if self.ages else ()
+        travel = files("calls") if "travel" in self.calls else ()
         calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *travel)
         return (*signals, *plays, *calls)
 
@@ -360,7 +340,8 @@ def data_folder(name: str) -> Path:
 
 
 @functools.cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """The settings for all templates."""
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(data_folder("templates")),
         undefined=jinja2.StrictUndefined,
@@ -374,7 +355,7 @@ def _environment() -> jinja2.Environment:
 
 def template(template: str, /, **values: object) -> str:
     """The text of a template filled in with these values."""
-    return _environment().get_template(template).render(values)
+    return environment().get_template(template).render(values)
 
 
 @dataclass(frozen=True)
@@ -559,8 +540,7 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
-    own: Sequence[Piece] = (),
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]], own: Sequence[Piece]
 ) -> list[Piece]:
     """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
     `api`; `own`: functions of a user's own blocks, which stay unchanged."""
@@ -616,7 +596,7 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
     made = []
     for op in operators:
         named = fields(functions, op)
-        for piece in needed(_pieces([variant.state], family.facts | variant.facts), [f"hystgen_{op}_t"]):
+        for piece in needed(_pieces([CORNER_STATE], family.facts | variant.facts), [f"hystgen_{op}_t"]):
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
@@ -737,14 +717,9 @@ def _named(
     return _NAME.sub(renamed, text)
 
 
-def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
-    """Type definitions."""
-    return _named(_joined(pieces), prefix, family, prefix)
-
-
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
     """Every type definition in these headers of the run time."""
-    return types(_pieces(files, family.facts), prefix, family)
+    return _named(_joined(_pieces(files, family.facts)), prefix, family, prefix)
 
 
 def prototypes(prefix: str, family: Family) -> str:

@@ -50,27 +50,12 @@ def _fractions(length: int) -> list[float]:
 
 
 @dataclass(frozen=True)
-class Sample:
-    """A call with its letter and argument, and the expected answer and status, as C text."""
-
-    call: str
-    argument: str
-    answer: str
-    status: int
-
-    @property
-    def row(self) -> str:
-        """The sample in C."""
-        return f"{{'{self.call}', {self.argument}, {self.answer}, {self.status}u}}"
-
-
-@dataclass(frozen=True)
 class Operator:
-    """The test of an operator: its settings with their letters, and its samples."""
+    """The test of an operator: its settings with their letters, and its samples in C."""
 
     name: str
     settings: list[tuple[str, str]]
-    samples: list[Sample]
+    samples: list[str]
 
 
 def operators(one: EmittedModel) -> list[Operator]:
@@ -107,7 +92,8 @@ def _setting(t: ChainTables, call: str, turn: int) -> float:
     return low + (0.5 + way) * (high - low)
 
 
-def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[Sample]:
+def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[str]:
+    """Calls, each with its letter and argument, and the expected answer and status."""
     numbers, between = one.numbers.tables, one.form.between
     low, high = numbers.limits.output[0] if inverse else numbers.limits.drive[0]
     drive_low, drive_high = numbers.limits.drive.low[0], numbers.limits.drive.high[0]
@@ -133,5 +119,6 @@ def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[
     status[op >= slots.OP_UNREAD] = slots.OP_UNREAD
     letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}
     return [
-        Sample(letters[c], literal(a), literal(y), int(s)) for c, a, y, s in zip(calls, x, answers, status, strict=True)
+        f"{{'{letters[c]}', {literal(a)}, {literal(y)}, {s}u}}"
+        for c, a, y, s in zip(calls, x, answers, status, strict=True)
     ]

@@ -19,7 +19,8 @@ EDITED = "was edited by hand"
 
 @dataclass(frozen=True)
 class Difference:
-    """A file that differs from what would be written: `reasons` in words, and the options in its own banner."""
+    """A file that differs from what would be written, or that no model writes: `reasons` in words, and the options in
+    its own banner, none for a file that no model writes."""
 
     path: Path
     reasons: tuple[str, ...]
@@ -71,19 +72,7 @@ def _words(options: Mapping[str, str], keys: list[str]) -> str:
     return " ".join(f"--{key} {options[key]}" for key in keys if key in options) or "unreadable options"
 
 
-@dataclass(frozen=True)
-class Orphan:
-    """An emitted file that none of the models writes; `reason` in words."""
-
-    path: Path
-    reason: str
-
-    def sentence(self) -> str:
-        """A sentence on the file and the reason."""
-        return f"{self.path} {self.reason}"
-
-
-def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Orphan]:
+def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Difference]:
     """C files in `folder` with a hystgen banner whose names are not among those `written` for all the `models`."""
     found = []
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
@@ -100,7 +89,7 @@ def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> 
                 reason = f"belongs to model {banner.model} but is not written with these options"
             else:
                 reason = f"belongs to model {banner.model}, which is not in any of the given parameter files"
-            found.append(Orphan(path, reason))
+            found.append(Difference(path, (reason,), {}))
     return found
 
 
@@ -128,7 +117,7 @@ class Stale:
 
 
 def advice(
-    models: Sequence[Stale], unwritten: Sequence[Orphan], folder: str, given: Mapping[str, str | bool],
+    models: Sequence[Stale], unwritten: Sequence[Difference], folder: str, given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
     """Commands that resolve all differences and orphans, each with its effect.
@@ -158,7 +147,8 @@ def advice(
         said.append(f"to {'replace them' if groups else 'write them again'}: {asked}{lost}")
     if unwritten:
         paths = [os.path.join(folder, each.path.name) for each in unwritten]
-        which = ", or give their parameter files too" if any("in any of" in each.reason for each in unwritten) else ""
+        foreign = any("in any of" in each.reasons[0] for each in unwritten)
+        which = ", or give their parameter files too" if foreign else ""
         said.append(f"to delete what no model writes: {shlex.join(['rm', *paths])}{which}")
     return said
 

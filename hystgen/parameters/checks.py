@@ -438,7 +438,7 @@ class _Checker:
         if selector in effect and selector in chosen.model_fields:
             if self.judged((*path, selector)):
                 return
-            known = {literal: shape for shape in shapes for literal in _literals(shape, selector)}
+            known = {each: shape for shape in shapes for each in get_args(shape.model_fields[selector].annotation)}
             given = effect[selector]
             if not isinstance(given, str) or given not in known:
                 self.add((*path, selector), _choice(given, tuple(known)))
@@ -468,11 +468,6 @@ class _Checker:
             return tuple(self.discretisation.thresholds)
         found = self.get("model", "pi", "thresholds")
         return tuple(found) if found else None
-
-
-def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
-    """The literals that a shape of an effect allows for a key."""
-    return get_args(shape.model_fields[key].annotation)
 
 
 _TWO_NUMBERS = "must be two numbers; write [lowest, highest]"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, StreamMark
@@ -81,13 +81,6 @@ class _LimitError(Exception):
     """Raised to leave the rest of the file unread."""
 
 
-class _Unusable:
-    """Key of an entry that is scanned for problems and then dropped."""
-
-
-_UNUSABLE = _Unusable()
-
-
 @dataclass
 class _OpenNode:
     """A mapping or list still being read."""
@@ -97,7 +90,8 @@ class _OpenNode:
     """False inside an entry that will be dropped and whose positions are therefore not recorded."""
     entries: dict[str, object] | list[object]
     is_key: bool = False
-    key: str | _Unusable | None = None
+    key: str | Literal[False] | None = None
+    """Key of the value that comes next; False if that is scanned for problems and then dropped."""
 
 
 def resolve(text: str) -> str | int | float | bool | None:
@@ -233,7 +227,7 @@ class _TreeBuilder:
             document.refuse((), position, f"more than {MAX_VALUES} keys and values; keep one model per file")
             raise _LimitError
         level = self.levels[-1] if self.levels else None
-        live = level is None or (level.live and level.key is not _UNUSABLE)
+        live = level is None or (level.live and level.key is not False)
         is_key = level is not None and isinstance(level.entries, dict) and level.key is None
         path = self._path(level)
         accepted = self._plain(event, path, position)
@@ -243,7 +237,7 @@ class _TreeBuilder:
                 document.poisoned.add(path)
         if is_key:
             assert level is not None
-            level.key = _UNUSABLE
+            level.key = False
         if isinstance(event, MappingStartEvent | SequenceStartEvent):
             if is_key:
                 document.refuse(path, position, "a key must be text, not a list or mapping; correct the key")

@@ -203,22 +203,17 @@ def plan(
     model = load(source, effects) if isinstance(source, str | os.PathLike) else as_model(source)
     named = f"{model.name}.yaml" if isinstance(source, Model) else os.fspath(source)
     file = model.parameters
-    if max_rate is not None:
-        max_rate = arguments.real("max_rate", max_rate, "input units per second")
-    if sample_time is not None:
-        sample_time = arguments.real("sample_time", sample_time, "seconds")
-    if rate is not None:
-        rate = arguments.real("rate", rate, "samples per second")
-    given = (
-        ("max rate", max_rate, "input units per second"),
-        ("sample time", sample_time, "seconds"),
-        ("rate", rate, "samples per second"),
-    )
-    problems = [
-        f"the {name} {value!r} is not a number above 0; give {unit}"
-        for name, value, unit in given
-        if value is not None and not 0.0 < value < math.inf
-    ]
+    problems: list[str] = []
+
+    def above_zero(name: str, value: float | None, unit: str) -> float | None:
+        found = None if value is None else arguments.real(name, value, unit)
+        if found is not None and not 0.0 < found < math.inf:
+            problems.append(f"the {name.replace('_', ' ')} {found!r} is not a number above 0; give {unit}")
+        return found
+
+    max_rate = above_zero("max_rate", max_rate, "input units per second")
+    sample_time = above_zero("sample_time", sample_time, "seconds")
+    rate = above_zero("rate", rate, "samples per second")
     if rate is not None and sample_time is not None:
         problems.append("the rate is the reciprocal of the sample time; give only one of them")
     low, high = file.input_range

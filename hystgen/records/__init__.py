@@ -17,7 +17,7 @@ import io
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, TYPE_CHECKING, cast
 
 from hystgen.basics import arguments, console
 from hystgen.basics.problems import RecordError, printable
@@ -33,8 +33,11 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
 from hystgen.records.tdms import read_tdms
-from hystgen.records.units import HasUnits, converted, wanted
+from hystgen.records.units import converted, wanted
 from hystgen.records.writing import columns_text, write_columns
+
+if TYPE_CHECKING:
+    from hystgen.parameters.schema import Units
 
 Source = Record | str | os.PathLike[str] | Columns
 """A record, the path of a data file, or its samples in memory."""
@@ -130,7 +133,7 @@ def read_record(
 
 
 def in_units(
-    records: Iterable[Record], model: HasUnits | None = None, *, need: Sequence[str] = ("v", "y"),
+    records: Iterable[Record], model: Units | None = None, *, need: Sequence[str] = ("v", "y"),
     file: tuple[str, Mapping[str, str] | None] = ("", None),
     named: tuple[str, Mapping[str, str] | None] = ("units", None), sources: Sequence[object] = (),
 ) -> list[Record]:

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from hystgen.basics import extras
 from hystgen.records import mat_nesting
-from hystgen.records.columns import Column, Step, column, from_number, is_named
+from hystgen.records.columns import Column, Step, from_number, is_named
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
             shape = _npy_shape(archive, name if name in members else f"{name}.npy")
             length = one_dimension(shape)
             if length:
-                columns.append(column(name, length=length, read=partial(_npy_vector, archive, name)))
+                columns.append(Column(name, length=length, read=partial(_npy_vector, archive, name)))
             elif not _scalar(name, "", partial(_npy_vector, archive, name), shape, steps):
                 ignored.append(name)
                 if in_matrix(shape):
@@ -88,9 +87,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
     try:
         from scipy.io import whosmat
     except ImportError:
-        raise reading.refuse(
-            f"MATLAB .mat files need the package scipy; {extras.install('formats')}, or export CSV or .npz"
-        ) from None
+        raise reading.uninstalled("MATLAB .mat", "scipy", "CSV or .npz") from None
     with reading.parsing("a MATLAB v5 .mat file"):
         if wrong := mat_nesting.problem(stream):
             raise reading.refuse(f"has {wrong}; export the signals as vectors")
@@ -105,7 +102,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
                 _fields(_mat_variables(stream, [name])[name], f"{name}.", columns, ignored, steps)
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
                 vectors.add(name, one_dimension(shape))
-                columns.append(column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
+                columns.append(Column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
             elif kind not in MATLAB_NUMBERS or not _scalar(name, "", partial(_mat_matrix, stream, name), shape, steps):
                 ignored.append(name)
                 if kind in MATLAB_NUMBERS and in_matrix(shape):
@@ -179,7 +176,7 @@ def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
                 name = own
             else:
                 name = field if len(structs) == 1 else f"{own or f'({number})'}.{field}"
-            columns.append(column(name, folder, beside(texts, _UNITS), length, read))
+            columns.append(Column(name, folder, beside(texts, _UNITS), length, read))
     return columns
 
 
@@ -214,6 +211,6 @@ def _fields(
             continue
         numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
         if numbers and one_dimension(value.shape):
-            columns.append(column(name, folder, length=value.size, read=value.ravel))
+            columns.append(Column(name, folder, length=value.size, read=value.ravel))
         elif not numbers or not _scalar(name, folder, value.ravel, value.shape, steps):
             ignored.append(folder + name)

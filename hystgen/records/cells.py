@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass
 from datetime import date
 
@@ -44,10 +43,6 @@ class Clock:
         self._midnights = 0
         self._dates: frozenset[str] = frozenset()
         self.problem = ""
-
-    def copy(self) -> Clock:
-        """A copy that continues from here, for an attempt that may be abandoned."""
-        return copy(self)
 
     def seconds(self, cell: str) -> float:
         """Seconds from the column's first time. Raises ValueError for a cell that is not a time."""

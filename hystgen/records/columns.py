@@ -267,41 +267,29 @@ _WORDS = re.compile(r"[^\W\d_]+")
 _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Column:
     """A column of the file; its name need not be unique.
 
-    `name`: the full name, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without its
-    unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns
-    the numbers as a one-dimensional array that the caller owns; `also`: another name of the column in the file.
+    `own`: the last part of its name, `drive [V]`; `folder`: everything before that, the group or struct that holds the
+    column with its separator, empty at the top level; `unit`: the one that the file stores separately, else the one in
+    the name, empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns the numbers
+    as a one-dimensional array that the caller owns; `also`: another name of the column in the file; `name`: the full
+    name, `session1/drive [V]`; `label`: the last part without its unit, `drive`.
     """
 
-    name: str
     own: str
-    label: str
+    folder: str = ""
     unit: str = ""
     length: int = 0
     read: Callable[[], NDArray[np.generic]] | None = None
     also: str = ""
+    name: str = field(init=False)
+    label: str = field(init=False)
 
-    @property
-    def folder(self) -> str:
-        """Everything before the last part: the group or struct that holds the column; empty at the top level."""
-        return self.name.removesuffix(self.own)
-
-
-def column(
-    name: str,
-    folder: str = "",
-    unit: str = "",
-    length: int = 0,
-    read: Callable[[], NDArray[np.generic]] | None = None,
-    also: str = "",
-) -> Column:
-    """A column called `name` in `folder` (with its separator); a `unit` that the file stores separately takes
-    precedence over one in the name."""
-    label, own_unit = split_unit(name)
-    return Column(folder + name, name, label, unit or own_unit, length, read, also)
+    def __post_init__(self) -> None:
+        self.label, unit = split_unit(self.own)
+        self.name, self.unit = self.folder + self.own, self.unit or unit
 
 
 def meaning(c: Column) -> str:

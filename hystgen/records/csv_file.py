@@ -12,7 +12,8 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from typing import IO
 
 import numpy as np
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import counted, printable
 from hystgen.records import layout
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Clock, Dialect, is_comment, shape
-from hystgen.records.columns import LISTED, Column, column
+from hystgen.records.columns import LISTED, Column
 from hystgen.records.layout import TableLayout
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
@@ -139,13 +140,15 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     names = found.names
     units = found.units or [""] * len(names)
     also = found.also or [""] * len(names)
-    columns = [column(name, unit=units[k], also=also[k]) for k, name in enumerate(names)]
-    columns = [replace(c, unit="s") if k in found.clocks else c for k, c in enumerate(columns)]
+    columns = [
+        Column(name, unit="s" if k in found.clocks else units[k], also=also[k]) for k, name in enumerate(names)
+    ]
     chosen = reading.chosen(columns, line=found.header or 1, steps=found.steps)
     if "t" in chosen and columns.index(chosen["t"]) in found.clocks:
         reading.understood("times of day counted in seconds from the first")
-    body = _Body(reading, found, {ours: columns.index(c) for ours, c in chosen.items()}, _size(stream))
-    body.take(_below(sample, found.first))
+    size = os.fstat(stream.fileno()).st_size  # 0 for a pipe
+    body = _Body(reading, found, {ours: columns.index(c) for ours, c in chosen.items()}, size)
+    body.take("".join(sample.split("\n", found.first - 1)[found.first - 1 :]))
     for text in blocks:
         body.take(text)
     return body.table(columns, chosen)
@@ -195,21 +198,6 @@ def _is_below_text(lines: Sequence[str], header: int) -> bool:
     """Whether a header is a comment, or the lines above it are not comments."""
     above = (line for line in lines[: header - 1] if line.strip())
     return is_comment(lines[header - 1]) or not all(map(is_comment, above))
-
-
-def _below(text: str, first: int) -> str:
-    """The text from line `first` on; lines are numbered from 1."""
-    start = 0
-    for _ in range(first - 1):
-        start = text.find("\n", start) + 1
-        if not start:
-            return ""
-    return text[start:]
-
-
-def _size(stream: IO[bytes]) -> int:
-    """Size of the file in bytes; 0 for a pipe."""
-    return os.fstat(stream.fileno()).st_size
 
 
 @dataclass
@@ -373,7 +361,7 @@ class _Body:
             if dialect.decimal == dialect.delimiter or "." in text:
                 return None
             text = text.replace(dialect.decimal, ".")
-        clock = self.clock.copy()
+        clock = copy(self.clock)  # goes on from here, in an attempt that may be abandoned
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")

@@ -13,9 +13,8 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import extras
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
-from hystgen.records.columns import Column, Step, column, from_number, is_named
+from hystgen.records.columns import Column, Step, from_number, is_named
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
 
 if TYPE_CHECKING:
@@ -51,10 +50,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
     try:
         import h5py
     except ImportError:
-        what = "MATLAB v7.3" if matlab else "HDF5"
-        raise reading.refuse(
-            f"{what} files need the package h5py; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat (v7)"
-        ) from None
+        raise reading.uninstalled("MATLAB v7.3" if matlab else "HDF5", "h5py") from None
     with reading.parsing(kind), h5py.File(reading.file, "r") as file:
         columns: list[Column] = []
         ignored: list[str] = []
@@ -88,7 +84,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 columns.extend(list_of_structs(folder, [(texts, {name: (length, partial(_vector, reading, found))})]))
             elif length:
                 unit = "" if matlab else _unit(found)
-                columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
+                columns.append(Column(name, folder, unit, length, partial(_vector, reading, found)))
             elif (step := _scalar(found, name, folder, matlab)) is not None:
                 steps.append(step)
             else:

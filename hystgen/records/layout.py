@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from hystgen.basics.problems import printable
 from hystgen.records import columns
 from hystgen.records.cells import BLANKS, Clock, Dialect, is_comment
-from hystgen.records.columns import STANDARD, Step, column, meaning, unit_alone
+from hystgen.records.columns import STANDARD, Column, Step, meaning, unit_alone
 from hystgen.records.reading import Reading
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": '"|"', BLANKS: "blanks"}
@@ -95,13 +95,9 @@ def _shown(reading: Reading, lines: Sequence[str]) -> TableLayout:
     views = [view for dialect in dialects if (view := _view(dialect, seen)) is not None]
     if not views:
         return _without_numbers(reading, seen, dialects)
-    best: tuple[_View, TableLayout | None] | None = None
-    for view in sorted(views, key=lambda each: (each.width < 2, -each.score)):
-        layout = _with_header(reading, view, seen)
-        if best is None or (best[1] is None and layout is not None):
-            best = view, layout
-    assert best is not None
-    view, layout = best
+    ranked = sorted(views, key=lambda each: (each.width < 2, -each.score))
+    found = [(view, _with_header(reading, view, seen)) for view in ranked]
+    view, layout = next((each for each in found if each[1] is not None), found[0])
     _decided(reading, view, seen)
     if layout is None:
         layout = _headerless(reading, view, seen)
@@ -152,7 +148,7 @@ def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Table
         return plain or comment
 
     def known(found: TableLayout) -> int:
-        columns = [column(name, unit=unit) for name, unit in zip(found.names, found.units, strict=True)]
+        columns = [Column(name, unit=unit) for name, unit in zip(found.names, found.units, strict=True)]
         asked = {*STANDARD, "u", *reading.columns.values()}
         return sum(bool({c.name, c.label} & asked or meaning(c)) for c in columns)
 
@@ -566,7 +562,8 @@ def tektronix(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     The settings hold what the header lacks: the units of time and of each channel, and the channels' labels, if given.
     """
     delimiter = reading.delimiter or next((mark for mark in ",;\t" if f"TIME{mark}" in "\n".join(lines)), ",")
-    dialect = Dialect(delimiter, "," if delimiter != "," and _decimal_commas(lines, delimiter) else ".")
+    commas = any(line.startswith(f"Sample Interval{delimiter}") and "," in line for line in lines)
+    dialect = Dialect(delimiter, "," if delimiter != "," and commas else ".")
     settings: dict[str, list[str]] = {}
     header = next((number for number, line in enumerate(lines, 1) if line.startswith(f"TIME{delimiter}")), None)
     if header is None:
@@ -590,10 +587,6 @@ def tektronix(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
         ["", *values] if labelled else [],
         kind="Tektronix CSV",
     )
-
-
-def _decimal_commas(lines: Sequence[str], delimiter: str) -> bool:
-    return any(line.startswith(f"Sample Interval{delimiter}") and "," in line for line in lines)
 
 
 # CSV from Rigol oscilloscopes --------------------------------------------------------------------------------

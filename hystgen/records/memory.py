@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics import arguments
 from hystgen.basics.problems import RecordError
-from hystgen.records.columns import STANDARD, Column, column
+from hystgen.records.columns import STANDARD, Column
 from hystgen.records.reading import Reading, Table, one_dimension, repaired
 from hystgen.records.record import Record
 
@@ -132,7 +132,7 @@ def _table(reading: Reading, named: Mapping[str, object]) -> Table:
         length = 0 if numbers is None else one_dimension(numbers.shape)
         if numbers is not None and length:
             unit = "s" if np.asarray(values).dtype.kind in "mM" else ""
-            columns.append(column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
+            columns.append(Column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
         else:
             ignored.append(name)
     return reading.table(columns, ignored)

@@ -8,8 +8,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import extras
-from hystgen.records.columns import Column, column
+from hystgen.records.columns import Column
 from hystgen.records.reading import Reading, Table
 
 if TYPE_CHECKING:
@@ -29,17 +28,14 @@ def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
     try:
         import pyarrow.parquet as pq
     except ImportError:
-        raise reading.refuse(
-            f"Parquet files need the package pyarrow; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat "
-            "(v7)"
-        ) from None
+        raise reading.uninstalled("Parquet", "pyarrow") from None
     with reading.parsing("a Parquet file"), pq.ParquetFile(stream, pre_buffer=False) as file:
         columns: list[Column] = []
         ignored: list[str] = []
         for field in file.schema_arrow:
             if _is_number(field.type):
                 length = file.metadata.num_rows
-                columns.append(column(field.name, "", _unit(field), length, partial(_vector, reading, file, field)))
+                columns.append(Column(field.name, "", _unit(field), length, partial(_vector, reading, file, field)))
             else:
                 ignored.append(field.name)
         return reading.table(columns, ignored)

@@ -15,8 +15,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import extras
 from hystgen.basics.problems import RecordError, counted, printable
-from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, column, further_names, to_seconds
+from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
 from hystgen.records.record import Array, Record
 
 SAME_STEP = 1e-6
@@ -116,6 +117,10 @@ class Reading:
         """The error to raise for a problem that ends the reading."""
         self.problem(text, line)
         return RecordError(self.problems)
+
+    def uninstalled(self, files: str, package: str, others: str = "CSV, .npz or MATLAB .mat (v7)") -> RecordError:
+        """The error to raise for files whose package is not installed; `others`: formats that do not need it."""
+        return self.refuse(f"{files} files need the package {package}; {extras.install('formats')}, or export {others}")
 
     def refuse_if_any(self) -> None:
         """Raise RecordError with the problems found so far, if any."""
@@ -233,7 +238,7 @@ class Reading:
             )
         across = shape.index(width)
         return [
-            column(str(k + 1), length=max(shape), read=lambda k=k: np.take(read(), k, across))  # type: ignore[misc]
+            Column(str(k + 1), length=max(shape), read=lambda k=k: np.take(read(), k, across))  # type: ignore[misc]
             for k in range(width)
         ]
 

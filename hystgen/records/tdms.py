@@ -9,8 +9,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import extras
-from hystgen.records.columns import Column, Step, column
+from hystgen.records.columns import Column, Step
 from hystgen.records.reading import Reading, Table
 
 if TYPE_CHECKING:
@@ -26,9 +25,7 @@ def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
     try:
         from nptdms import TdmsFile
     except ImportError:
-        raise reading.refuse(
-            f"TDMS files need the package npTDMS; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat (v7)"
-        ) from None
+        raise reading.uninstalled("TDMS", "npTDMS") from None
     with reading.parsing("a TDMS file"), TdmsFile.open(stream) as file:
         columns: list[Column] = []
         ignored: list[str] = []
@@ -42,7 +39,7 @@ def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
                     continue
                 unit = "s" if stamps else _unit(channel)
                 read = partial(_vector, reading, channel)
-                columns.append(column(channel.name, folder, unit, len(channel), read))
+                columns.append(Column(channel.name, folder, unit, len(channel), read))
                 steps += _steps(channel, folder + channel.name)
         return reading.table(columns, ignored, steps=steps)
 

@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import RecordError, printable
 from hystgen.records.columns import TIMES, plain
 from hystgen.records.record import Array, Record
+
+if TYPE_CHECKING:
+    from hystgen.parameters.schema import Units
 
 TEMPERATURE = "temperature"
 """The column that effects expect in degC."""
@@ -139,18 +142,6 @@ class UnitGoal(NamedTuple):
     told: bool = False
 
 
-class HasUnits(Protocol):
-    """The units of a parameter file."""
-
-    @property
-    def input(self) -> str:
-        """Unit of the drive."""
-
-    @property
-    def output(self) -> str:
-        """Unit of the displacement."""
-
-
 QUANTITIES = {"input": "drive", "output": "output"}
 """Keys of a parameter file's `units`, and the quantity each belongs to."""
 
@@ -160,7 +151,7 @@ KEYS = {"v": "input", "y": "output", "u": "output"}
 
 
 def wanted(
-    model: HasUnits | None, file: tuple[str, Mapping[str, str]], named: tuple[str, Mapping[str, str]]
+    model: Units | None, file: tuple[str, Mapping[str, str]], named: tuple[str, Mapping[str, str]]
 ) -> dict[str, UnitGoal]:
     """Target units for `input` and `output`: the user's, else the file's, else the model's."""
     found: dict[str, UnitGoal] = {}

@@ -52,7 +52,10 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     result = found.result
     each = list(itertools.product(FIGURES, (WIDE, NARROW)))
     with drawing.styled():
-        drawn = dict(zip(each, parallel.each(lambda one: _drawn(found, *one), each, parallel.cores()), strict=True))
+        contents = parallel.each(
+            lambda one: drawing.content(FIGURES[one[0]](found, one[1]), "svg"), each, parallel.cores()
+        )
+    drawn = dict(zip(each, contents, strict=True))
     figures = {
         name: Picture(name, drawn[name, WIDE], drawn[name, NARROW], CAPTIONS[name], ALTERNATIVES[name])
         for name in FIGURES
@@ -85,10 +88,6 @@ def _next_step(found: Diagnosis) -> Text:
     if found.not_emitted():
         return Text("Your next step: see the tracking error with the model.", "hystgen track params.yaml RECORDS")
     return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
-
-
-def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
-    return drawing.content(FIGURES[name](found, width), "svg")
 
 
 def _chance(p_value: float) -> str:

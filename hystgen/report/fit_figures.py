@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hystgen.identification import Fit, Used
+    from hystgen.parameters.schema import Units
     from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -122,29 +123,10 @@ def role(each: Shown) -> str:
     return "held out" if each.used.held_out else "fit"
 
 
-@dataclass(frozen=True)
-class AxisUnits:
-    """Units of drive and output, empty if unknown."""
-
-    drive: str
-    output: str
-
-    @property
-    def weight(self) -> str:
-        """Unit of a weight."""
-        return f"{self.output}/{self.drive}" if self.drive and self.output else ""
-
-
-def units_of(fit: Fit) -> AxisUnits:
-    """The units of a fit's parameters."""
-    units = fit.parameters.units
-    return AxisUnits(units.input or "", units.output or "")
-
-
 # Panels: one pair of axes each ---------------------------------------------------------------
 
 
-def loop_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
+def loop_panel(axes: Axes, each: Shown, units: Units) -> None:
     """Measured loop and model over the compared samples."""
     for k, (start, stop) in enumerate(each.used.parts):
         here = slice(start, stop)
@@ -154,7 +136,7 @@ def loop_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
                 each.drive[here], np.where(known, values[here], np.nan), **drawing.LINES[name],
                 label=None if k else name, rasterized=stop - start > drawing.MOST_POINTS,
             )
-    axes.set(xlabel=label("drive", units.drive), ylabel=label("displacement", units.output))
+    axes.set(xlabel=label("drive", units.input), ylabel=label("displacement", units.output))
     axes.set_title(f"{each.record.name} ({role(each)})", pad=20)
     drawing.legend_above(axes)
 
@@ -179,7 +161,7 @@ def _shade(axes: Axes, each: Shown, named: bool) -> None:
         )
 
 
-def overlay_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
+def overlay_panel(axes: Axes, each: Shown, units: Units) -> None:
     """Measured and model over time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
@@ -204,7 +186,7 @@ def overlay_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
     drawing.legend_above(axes, 3)
 
 
-def residual_panel(axes: Axes, each: Shown, units: AxisUnits, colour: str = drawing.RESIDUAL) -> None:
+def residual_panel(axes: Axes, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
     """The residual over time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
@@ -257,7 +239,7 @@ def _limits(x: Array) -> tuple[float, float]:
     return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
 
 
-def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
+def weight_panel(axes: Axes, fit: Fit, units: Units, places: Sequence[int]) -> None:
     """Some of the weights as bars labelled with their thresholds, with intervals."""
     part = fit.parameters.model.pi
     at = np.arange(len(places))
@@ -273,7 +255,8 @@ def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) 
     axes.grid(axis="x", visible=False)
     axes.set_xlim(-0.7, len(places) - 0.3)
     axes.set_ylim(bottom=0.0)
-    axes.set(ylabel=label("weight", units.weight))
+    per_drive = f"{units.output}/{units.input}" if units.input and units.output else ""
+    axes.set(ylabel=label("weight", per_drive))
 
 
 # Figures ---------------------------------------------------------------------------------------------------
@@ -281,7 +264,7 @@ def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) 
 
 def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Measured and modelled loops for a fitted record and a held-out record."""
-    pair, units = drawn_ones(shown), units_of(fit)
+    pair, units = drawn_ones(shown), fit.parameters.units
     figure = drawing.figure(9.6, 4.4) if wide else drawing.figure(4.4, 4.0 * len(pair))
     axes = figure.subplots(1, len(pair), squeeze=False) if wide else figure.subplots(len(pair), 1, squeeze=False)
     for ax, each in zip(axes.flat, pair, strict=True):
@@ -291,7 +274,7 @@ def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
 
 def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Measured and model over time with the residual below, for a fitted record and a held-out record."""
-    pair, units = drawn_ones(shown), units_of(fit)
+    pair, units = drawn_ones(shown), fit.parameters.units
     figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
     rows = figure.subfigures(len(pair), 1, squeeze=False)
     for row, each in zip(rows.flat, pair, strict=True):
@@ -308,14 +291,14 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
 
 def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Residual against drive, rate, time and displacement; of the held-out records if there are any."""
-    chosen, units = judged(shown), units_of(fit)
+    chosen, units = judged(shown), fit.parameters.units
     noise = noise_of(chosen)
     left = np.concatenate([each.residual for each in chosen])
     figure = drawing.figure(9.6, 6.4) if wide else drawing.figure(4.4, 11.0)
     axes = figure.subplots(2, 2, sharey=True) if wide else figure.subplots(4, 1)
-    per_second = f"{units.drive}/s" if units.drive else "1/s"
+    per_second = f"{units.input}/s" if units.input else "1/s"
     against: list[tuple[Callable[[Shown], Array], str]] = [
-        (lambda each: each.drive, label("drive", units.drive)),
+        (lambda each: each.drive, label("drive", units.input)),
         (lambda each: each.rate, label("drive rate", per_second)),
         (lambda each: each.time, "time (s)"),
         (lambda each: each.measured, label("displacement", units.output)),
@@ -348,7 +331,7 @@ def noise_of(shown: Sequence[Shown]) -> float | None:
 
 def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     """Initial loading curve with its band; with a front, also the front and its distance from a straight line."""
-    units, cascade = units_of(fit), cascade_of(fit.parameters)
+    units, cascade = fit.parameters.units, cascade_of(fit.parameters)
     bent = bool(cascade.stages)
     if wide:
         figure = drawing.figure(9.6, 7.0 if bent else 3.8)
@@ -361,7 +344,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     x = np.linspace(0.0, max(abs(end) for end in cascade.play_range), 400)
     middle = cascade.pi.loading_curve(x)
     low, high = fit.intervals.loading_curve(r, x)
-    inner = label("input of the plays" if bent else "drive", units.drive)
+    inner = label("input of the plays" if bent else "drive", units.input)
     curve.fill_between(x, low, high, color=drawing.MODEL, alpha=0.3, linewidth=0, label="95 % band")
     curve.plot(x, middle, color=drawing.MODEL, linewidth=1.4, label="loading curve")
     inside = r[r <= x[-1]]
@@ -385,8 +368,8 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
             for up, colour, name in branches:
                 ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
             ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")
-            ax.set(xlabel=label("drive", units.drive), ylabel=label("front" if not straight else "front - line",
-                                                                    units.drive))
+            ax.set(xlabel=label("drive", units.input), ylabel=label("front" if not straight else "front - line",
+                                                                    units.input))
             ax.set_title(title, pad=20)
         drawing.legend_above(front[0])
     return figure
@@ -394,7 +377,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
 
 def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     """The weights against their thresholds, with p_0 on an axis of its own."""
-    units = units_of(fit)
+    units = fit.parameters.units
     n = len(fit.parameters.model.pi.thresholds) - 1
     figure = drawing.figure(9.6 if wide else 4.4, 3.6)
     if not n:
@@ -405,7 +388,7 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     weight_panel(others, fit, units, range(1, n + 1))
     first.set_title("p\N{SUBSCRIPT ZERO}")
     others.set_title("plays")
-    others.set(xlabel=label("threshold", units.drive), ylabel="")
+    others.set(xlabel=label("threshold", units.input), ylabel="")
     return figure
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import base64
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jinja2
 from markupsafe import Markup
 
 from hystgen.emission import runtime
@@ -71,22 +69,8 @@ class Section:
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
     """The page: `title`, a `lead` with the main result in a few words, and the sections."""
-    template = _environment().get_template("report.html.j2")
-    return template.render(title=title, lead=lead, sections=sections)
-
-
-@functools.cache
-def _environment() -> jinja2.Environment:
-    made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(runtime.data_folder("templates")),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=True,
-    )
-    made.filters["data_uri"] = _data_uri
-    return made
+    template = runtime.environment().overlay(autoescape=True).get_template("report.html.j2")
+    return template.render(title=title, lead=lead, sections=sections, data_uri=_data_uri)
 
 
 def _data_uri(svg: bytes) -> Markup:

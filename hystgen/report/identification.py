@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ParamSpec
+from typing import ParamSpec
 
 import numpy as np
 
@@ -26,10 +26,6 @@ from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
-
-if TYPE_CHECKING:
-
-    from hystgen.identification import ErrorRow
 
 PAGE = "report.html"
 

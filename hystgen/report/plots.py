@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 from hystgen.basics import drawing
@@ -20,15 +18,8 @@ if TYPE_CHECKING:
     from hystgen.tracking import Tracking
 
 
-def show_tracking(tracking: Tracking, path: str | os.PathLike[str]) -> None:
-    """The motion in each record and the tracking error of each compensator over time, as PNG or SVG.
-
-    Raises PlotError.
-    """
-    drawing.picture(partial(_tracking_figure, tracking), path)
-
-
-def _tracking_figure(tracking: Tracking) -> Figure:
+def tracking_figure(tracking: Tracking) -> Figure:
+    """The motion in each record, and the tracking error of each compensator over time."""
     figure = drawing.figure(9.0, 1.0 + 3.4 * len(tracking.records))
     panels = figure.subplots(2 * len(tracking.records), 1, squeeze=False)[:, 0]
     colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
@@ -43,17 +34,12 @@ def _tracking_figure(tracking: Tracking) -> Figure:
     return figure
 
 
-def show_fit(fit: Fit, records: Sequence[Record], path: str | os.PathLike[str]) -> None:
-    """`fit_figure` as PNG or SVG. Raises PlotError."""
-    drawing.picture(partial(fit_figure, fit, records), path)
-
-
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
     """Measured and predicted loop of one record, residuals over time, and the weights.
 
     `records`: the fitted records, then the held-out ones; the loop is from a held-out record if there is one.
     """
-    units = fit_figures.units_of(fit)
+    units = fit.parameters.units
     shown = fit_figures.of_fit(fit, records)
     figure = drawing.figure(13.8, 4.2)
     loop, residual, weights = figure.subplots(1, 3)
@@ -65,6 +51,6 @@ def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
     drawing.legend_above(residual, 2)
     fit_figures.weight_panel(weights, fit, units, range(len(fit.parameters.model.pi.thresholds)))
     weights.set_title("Weights", pad=20)
-    weights.set(xlabel=label("threshold", units.drive))
+    weights.set(xlabel=label("threshold", units.input))
     figure.suptitle(f"{fit.parameters.name}: identified")
     return figure

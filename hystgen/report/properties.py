@@ -116,7 +116,7 @@ def cost(model: Model) -> str:
     """Cost of the C that `emit` would write, forward only if there is no inverse; empty if `emit` refuses."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
-        found = module.of(model.parameters, model.cascade, options).cost
+        found = module.of(model, options).cost
     except FormatError:
         return ""
     instances = (f"{op} instance {size} bytes of RAM" for op, size in found.memory.instances)
@@ -151,7 +151,7 @@ def _reading(model: Model) -> list[str]:
     """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses the model."""
     try:
         options = emit_options(model, operator="inverse")
-        return interface.reading(module.compensator(model.parameters, model.cascade, options))
+        return interface.reading(module.compensator(model, options))
     except (FormatError, NotInvertibleError, EffectsError):
         return []
 

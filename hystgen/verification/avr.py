@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hystgen.emission import cost, runtime
 from hystgen.verification import compilers
-from hystgen.verification.emulator import EmulatorError
+from hystgen.verification.emulator import EmulatorError, program
 from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Board
@@ -141,12 +141,7 @@ def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) 
 def run(board: Board, image: Path) -> int:
     """The self-test's result, which the firmware prints on its serial port. Raises EmulatorError."""
     command = [board.simulator, "-m", board.name, "-f", HERTZ, str(image)]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired:
-        raise EmulatorError(f"{board.simulator} -m {board.name} did not end within {SECONDS} s") from None
+    done = program(f"{board.simulator} -m {board.name}", command, SECONDS)
     said = done.stdout + done.stderr
     count = re.search(rf"{REPORT} (\d+)", said)
     if count is None or done.returncode:

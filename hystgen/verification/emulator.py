@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
-from collections.abc import Callable
+import subprocess
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +32,16 @@ PAGE = 0x1000
 
 class EmulatorError(RuntimeError):
     """The emulated core failed; the message says why."""
+
+
+def program(name: str, command: list[str], seconds: int) -> subprocess.CompletedProcess[str]:
+    """Run another emulator, called `name` in messages. Raises EmulatorError if it does not end in time."""
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=seconds
+        )
+    except subprocess.TimeoutExpired:
+        raise EmulatorError(f"{name} did not end within {seconds} s") from None
 
 
 @dataclass(frozen=True)
@@ -103,8 +115,7 @@ def _hook() -> Any:
 
 @dataclass(frozen=True)
 class _Registers:
-    arguments: tuple[int, ...]
-    result: int
+    arguments: list[int]  # the first also takes the result
     link: int
     stack: int
     program: int
@@ -139,16 +150,14 @@ class Core:
             self._uc = unicorn.Uc(unicorn.UC_ARCH_ARM, mode, getattr(arm_const, target.cpu))
             arguments = [getattr(arm_const, f"UC_ARM_REG_R{i}") for i in range(4)]
             return _Registers(
-                tuple(arguments), arguments[0], arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_SP,
-                arm_const.UC_ARM_REG_PC,
+                arguments, arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_SP, arm_const.UC_ARM_REG_PC
             )
         self._uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32, getattr(riscv_const, target.cpu))
         if target.fpu:
             self._uc.reg_write(riscv_const.UC_RISCV_REG_MSTATUS, 1 << 13)  # FS: the FPU on
         arguments = [getattr(riscv_const, f"UC_RISCV_REG_A{i}") for i in range(8)]
         return _Registers(
-            tuple(arguments), arguments[0], riscv_const.UC_RISCV_REG_RA, riscv_const.UC_RISCV_REG_SP,
-            riscv_const.UC_RISCV_REG_PC,
+            arguments, riscv_const.UC_RISCV_REG_RA, riscv_const.UC_RISCV_REG_SP, riscv_const.UC_RISCV_REG_PC
         )
 
     @property
@@ -184,7 +193,7 @@ class Core:
             raise EmulatorError(f"{function}: {error} at {where:#010x}, in {self._where(where)}") from None
         if uc.reg_read(registers.program) != self._return:
             raise EmulatorError(f"{function} did not return within {SECONDS} s")
-        return int(uc.reg_read(registers.result))
+        return int(uc.reg_read(registers.arguments[0]))
 
     def _where(self, address: int) -> str:
         for name, (start, size) in self._image.symbols.items():
@@ -209,14 +218,15 @@ class Core:
         self._uc.mem_write(places[0], call.tobytes())
         self._uc.mem_write(places[1], x.tobytes())
         code = slots.OP_STEP if counted == "step" else slots.OP_COMMIT
-        with_counter = self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call & slots.OP_CALL == code)))
-        with_counter(lambda: self.call(f"hystgen_harness_{op}", *places, len(x)))
+        with self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call & slots.OP_CALL == code))):
+            self.call(f"hystgen_harness_{op}", *places, len(x))
         answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)
         status = np.frombuffer(bytes(self._uc.mem_read(places[3], len(x))), dtype=np.uint8)
         return answer, status
 
-    def _counting(self, function: str, op: str, calls: int) -> Callable[[Callable[[], object]], None]:
-        """A function that runs an action with the hook in place."""
+    @contextlib.contextmanager
+    def _counting(self, function: str, op: str, calls: int) -> Iterator[None]:
+        """Count the instructions of a function, which is called this many times inside the context."""
         from unicorn import UC_HOOK_CODE
         from unicorn.unicorn_py3.unicorn import uc_hook_h, uclib
 
@@ -231,24 +241,18 @@ class Core:
             read_register=ctypes.cast(uclib.uc_reg_read, ctypes.c_void_p).value,
             stack_register=self._registers.stack,
         )
-
-        def run(action: Callable[[], object]) -> None:
-            handle = uc_hook_h()
-            hook = ctypes.cast(_hook(), ctypes.c_void_p)
-            # The binding's own hook_add would wrap a Python function; here, the address of compiled code is passed
-            # directly
-            failed = uclib.uc_hook_add(
-                self._uc._uch, ctypes.byref(handle), UC_HOOK_CODE, hook, ctypes.addressof(counter), 1, 0
-            )
-            if failed:
-                raise EmulatorError(f"the emulator refused the counting hook: error {failed}")
-            try:
-                action()
-            finally:
-                uclib.uc_hook_del(self._uc._uch, handle)
-            if counter.calls != calls:
-                raise EmulatorError(f"counted {counter.calls} calls of {function} where {calls} were made")
-            self._counts.append(counts)
-            self._stack_at_step = int(counter.stack_pointer) or self._stack_at_step
-
-        return run
+        handle, hook = uc_hook_h(), ctypes.cast(_hook(), ctypes.c_void_p)
+        # The binding's own hook_add would wrap a Python function; here, the address of compiled code is passed directly
+        failed = uclib.uc_hook_add(
+            self._uc._uch, ctypes.byref(handle), UC_HOOK_CODE, hook, ctypes.addressof(counter), 1, 0
+        )
+        if failed:
+            raise EmulatorError(f"the emulator refused the counting hook: error {failed}")
+        try:
+            yield
+        finally:
+            uclib.uc_hook_del(self._uc._uch, handle)
+        if counter.calls != calls:
+            raise EmulatorError(f"counted {counter.calls} calls of {function} where {calls} were made")
+        self._counts.append(counts)
+        self._stack_at_step = int(counter.stack_pointer) or self._stack_at_step

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
 from hystgen.emission import runtime
 from hystgen.verification.cross import CrossCompiler, MemoryMap
-from hystgen.verification.emulator import EmulatorError
+from hystgen.verification.emulator import EmulatorError, program
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Machine, Target
 
@@ -44,12 +43,7 @@ def run(machine: Machine, image: Path) -> int:
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel", str(image),
     ]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired:
-        raise EmulatorError(f"{QEMU} -M {machine.name} did not end within {SECONDS} s") from None
+    done = program(f"{QEMU} -M {machine.name}", command, SECONDS)
     if done.returncode < 0 or done.stderr.strip():
         raise EmulatorError(f"{QEMU} -M {machine.name} failed ({done.returncode}):\n{done.stderr.strip()}")
     if done.returncode == FAULT:

@@ -74,7 +74,7 @@ def verify(
                 wanted = functools.partial(records, length)
                 report.rows.extend(host.rows(written, wanted, real, compiler, folder, progress))
             elif isinstance(target, Board):
-                memory = module.of(model.parameters, model.cascade, options).cost.avr
+                memory = module.of(model, options).cost.avr
                 size = None if memory is None else avr.Size(model.cascade.pi.n, memory)
                 report.rows.extend(avr.rows(target, written, size, compiler, folder, progress))
             else:

@@ -75,11 +75,11 @@ def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic
 def write(folder: Path, model: Model, options: Options) -> Sources:
     """Write the emitted files and the harness into `folder`."""
     name = model.name
-    emitted = module.of(model.parameters, model.cascade, options)
-    texts = module.files(emitted)
+    emitted = module.of(model, options)
+    texts, calls = module.files(emitted), emitted.compensator.calls
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(name, options.operators, emitted.calls, ARITHMETICS[options.arithmetic])
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic])
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, options.operators, tuple(paths.values()), caller, selftest)
