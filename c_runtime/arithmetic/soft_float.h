@@ -1,7 +1,6 @@
 /* Whether floating-point operations are library calls here; the corner engine then avoids them.
-   Next to them a call costs little, so functions inlined elsewhere are called, to save code.
-   Numbers are compared by their bits there, but not doubles, which would take more code than the
-   calls. */
+   Next to them a call costs little, so functions inlined elsewhere are called, to save code. Floats
+   are then compared by their bits; with doubles that would take more code than the calls. */
 
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 #if (defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0)) ||                           \

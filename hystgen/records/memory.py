@@ -110,7 +110,7 @@ def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, o
     return found
 
 
-def _by_place(source: NDArray[np.generic] | tuple[Any, ...], name: str, sample_time: float | None) -> Sequence[str]:
+def _by_place(source: NDArray[np.generic] | tuple[object, ...], name: str, sample_time: float | None) -> Sequence[str]:
     """Our names for unnamed columns."""
     number = len(source) if isinstance(source, tuple) else source.shape[1] if source.ndim == 2 else 0
     if number == 3 or (number == 2 and sample_time is not None):

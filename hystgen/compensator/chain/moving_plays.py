@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
@@ -33,7 +33,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
-    def resting(r: Reals, s: State, i: int, w: Any) -> Any:
+    def resting(r: Reals, s: State, i: int, w: Scalar) -> Scalar:
         """Play i at rest with its input at w."""
         low = w - r[i]
         high = w + r[i]
@@ -41,7 +41,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return low if upper < low else upper
 
     @jit
-    def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
+    def sum_at(t: ChainTables, s: ChainState, w: Scalar) -> Any:
         """The sum of the plays with their input at w, moved there or at rest."""
         m, plays, play = t.moving, t.plays, s.plays.play
         r, p = plays.threshold, plays.weight
@@ -52,7 +52,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return total
 
     @jit
-    def tried_at(t: ChainTables, s: ChainState, w: Any) -> tuple[Any, Any, Any]:
+    def tried_at(t: ChainTables, s: ChainState, w: Scalar) -> tuple[Scalar, Scalar, Scalar]:
         """The same sum, its slope in w, and its slope in steady motion, in which moving plays follow fully."""
         m, plays = t.moving, t.plays
         r, p = plays.threshold, plays.weight
@@ -75,7 +75,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return total, slope, steady
 
     @jit
-    def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
+    def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Scalar) -> Any:
         """Move the plays while their input goes to w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
@@ -102,7 +102,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
                 values[i] = bent(m, plays, i, rest)
 
     @jit
-    def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
+    def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Scalar) -> Any:
         """Bring the plays to rest with their input at w. Returns their sum. `values[0]` is set to the slope, or in
         fixed point the rate, with which a search begins."""
         r, p = plays.threshold, plays.weight
@@ -122,7 +122,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         """Set the plays to the start memory, or all to 0, as `step.plays_of` does."""
 
     @jit
-    def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+    def follow(t: ChainTables, s: ChainState, w: Scalar) -> Any:
         """Move the plays with their input w. Returns their sum."""
         m = t.moving
         if m.moves == PLAIN and m.bends == STRAIGHT:
@@ -148,7 +148,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return level(t, moved_rest(m, t.plays, s.plays, s.lost, s.bent, s.plays.play[0]))
 
     @jit
-    def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+    def inverse_input(t: ChainTables, s: ChainState, h: Scalar) -> Any:
         """Input of the plays at which their sum is h."""
         m = t.moving
         total = asked(t, h)

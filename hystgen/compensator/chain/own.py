@@ -53,7 +53,7 @@ class System:
     c: Array
     d: float
 
-    def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None:
+    def _modes(self) -> tuple[NDArray[np.complex128], ...] | None:
         """The reciprocal of each mode's loss per sample, the eigenvectors, and their inverse.
 
         None if two modes coincide, since the eigenvectors then do not span the states.
@@ -232,7 +232,7 @@ class Linear(One):
         contracting = error / (now - before) if before < now else math.inf
         return min(back.largest * error, contracting)
 
-    def _shares(self, u: float) -> NDArray[Any]:
+    def _shares(self, u: float) -> NDArray[np.object_]:
         return np.array([Rounded(abs(each), u * abs(each), u) for each in self.numbers.tolist()], dtype=object)
 
 
