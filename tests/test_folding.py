@@ -255,6 +255,7 @@ TRUE = "static bool hystgen_g(int v) {\n    (void)v;\n    return true;\n}\n"
         (DOUBLE, ["self->last = hystgen_h(self, x);", "return hystgen_g(x);"],
          "{ self->last = hystgen_h(self, x); return x + x; }"),
         (DOUBLE, ["const int y = hystgen_g(x);", "return x;"], "{ return x; }"),
+        (ITSELF, ["unsigned int bits = 0;", "if (x > 9) {", "    bits |= 4;", "}", "return x;"], "{ return x; }"),
         (MOVED, ["const int y = hystgen_g(play);", "return play[0];"], None),  # the call moves a play
     ],
 )  # fmt: skip

@@ -352,8 +352,9 @@ class _Folding:
                 if uses == body.count(f"if ({found[1]}) {{"):  # never set
                     body = body.replace(found[0], "").replace(f"if ({found[1]}) {{", "if (false) {")
             for local in _UNUSED.finditer(body):
-                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", body)) == 1 and self._looks(local[2]):
-                    body = body.replace(local[0], "")
+                sets = re.compile(rf"^ *{local[1]} \|?= (\w+);\n", re.MULTILINE)
+                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", sets.sub("", body))) == 1 and self._looks(local[2]):
+                    body = sets.sub("", body).replace(local[0], "")
             body = re.sub(r"\b(\w+) < \1 \|\| \1 > \1", "false", body)
             body = body.replace("!true", "false").replace("!false", "true")
             body = _without_branches(body)
