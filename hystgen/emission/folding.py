@@ -118,7 +118,7 @@ class _Folding:
     here, to save stack; `meaning`: of a type name, since several can denote the same type here."""
 
     def __init__(
-        self, functions: Sequence[Function], kernels: Sequence[Function], comments: Sequence[str],
+        self, functions: Sequence[Function], kernels: Sequence[Function], comments: list[str],
         apart: Sequence[str], meaning: Callable[[str], str],
     ) -> None:
         self.functions = {each.name: each for each in functions}
@@ -250,17 +250,11 @@ class _Folding:
 
     def _answers(self, function: Function, expression: str) -> bool:
         """Whether an expression surely has the type that a function returns."""
-        if function.answer == "bool" and re.search(r" (?:[=!<>]=|[<>]) ", expression):
-            return True
-        if _PLAIN.fullmatch(expression):
-            own = dict(zip(function.names, function.types, strict=True)).get(expression, function.answer)
-            return self._same(own, function.answer)
         if found := re.match(r"\((\w+)\)(?=[\w(])", expression):
             return _single(expression[found.end() :]) and self._same(found[1], function.answer)
-        if found := re.match(r"(\w+)\(", expression):
-            other = self.functions.get(found[1]) or self._known.get(found[1])
-            return other is not None and _single(expression) and self._same(other.answer, function.answer)
-        return False
+        compared = function.answer == "bool" and re.search(r" (?:[=!<>]=|[<>]) ", expression)
+        stored = _PLAIN.fullmatch(expression) and expression not in function.names
+        return bool(compared or stored) or self._same(self._kind(function, expression), function.answer)
 
     def _converts(self, function: Function, caller: Function, start: int, stop: int) -> bool:
         """Whether a call's result is the caller's answer, an argument or the first value of a constant, of its type."""
@@ -299,11 +293,11 @@ class _Folding:
         """The caller's body with the statements of a function in place of its only call, if that is a statement."""
         body = caller.body
         begin, end = body.rfind("\n", 0, start) + 1, body.find("\n", stop) + 1
-        found = re.fullmatch(r"( *)(return |\(void\))?", body[begin:start])
-        if not found or body[stop:end].strip() != ";":
+        indent, before = re.match(r"( *)(.*)", body[begin:start]).groups()  # type: ignore[union-attr]
+        if before not in ("", "(void)", "return ") or body[stop:end].strip() != ";":
             return None
-        answers = found[2] == "return " and self._same(function.answer, caller.answer)
-        if not answers and (found[2] == "return " or re.search(r"\breturn\b", function.body)):
+        answers = before == "return " and self._same(function.answer, caller.answer)
+        if not answers and (before == "return " or re.search(r"\breturn\b", function.body)):
             return None
         words = set(re.findall(r"\w+", body)) | set(caller.names)
         inside, declared = _unmarked(function.body, function.names), ""
@@ -323,11 +317,13 @@ class _Folding:
             else:
                 declared = f"    {'' if set_here or '*' in kind else 'const '}{kind} {name} = {argument};\n"
         inside = _substituted(inside, given)
-        deeper = found[1][4:]
-        said = re.findall(r"\w+", self._comments[int(found[0])]) if (found := re.search(r"\d+", function.above)) else []
-        kept = all(name == argument or name not in said for name, argument in given.items())
-        whole = (f"    {function.above}" if inside and said and kept else "") + declared + inside
-        return body[:begin] + re.sub(r"^(?=.)", deeper, whole, flags=re.MULTILINE) + body[end:]
+        said = " ".join(self._comments[int(found[0])].split()) if (found := re.search(r"\d+", function.above)) else ""
+        kept = all(name == argument or name not in re.findall(r"\w+", said) for name, argument in given.items())
+        whole = declared + inside
+        if inside and said and kept:
+            self._comments.append(said)
+            whole = f"    /*{len(self._comments) - 1}*/\n{whole}"
+        return body[:begin] + re.sub(r"^(?=.)", indent[4:], whole, flags=re.MULTILINE) + body[end:]
 
     def _same(self, one: str, other: str) -> bool:
         """Whether two names denote the same type."""
@@ -352,8 +348,9 @@ class _Folding:
                 if uses == body.count(f"if ({found[1]}) {{"):  # never set
                     body = body.replace(found[0], "").replace(f"if ({found[1]}) {{", "if (false) {")
             for local in _UNUSED.finditer(body):
-                sets = re.compile(rf"^ *{local[1]} \|?= (\w+);\n", re.MULTILINE)
-                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", sets.sub("", body))) == 1 and self._looks(local[2]):
+                sets = re.compile(rf"^ *{local[1]} \|?= ([^;]*);\n", re.MULTILINE)
+                named = re.findall(rf"(?<![.>\w]){local[1]}\b", sets.sub("", body))
+                if len(named) == 1 and all(map(self._looks, [local[2] or "", *sets.findall(body)])):
                     body = sets.sub("", body).replace(local[0], "")
             body = re.sub(r"\b(\w+) < \1 \|\| \1 > \1", "false", body)
             body = body.replace("!true", "false").replace("!false", "true")
@@ -486,8 +483,10 @@ _LOCAL = re.compile(r"^ *(?:(?:const|static|volatile|unsigned) )*\w+ \**(\w+)(?:
 
 _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local flag that is initially false or unset."""
-_UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ \*?(\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
-"""A local variable with its first value."""
+_UNUSED = re.compile(
+    r"^ *(?!return )(?:const )?(?:unsigned )?\w+ \*?(\w+)(?: =\s([^;]*))?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE
+)
+"""A local variable with its first value, if it has one."""
 _ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;{]*);\n    return \2;\n\Z", re.MULTILINE)
 """A constant that is then returned; the initializer of a struct does not count, since it is not an expression."""
 _IF = re.compile(r"^( *)(\} else )?if \(([^{};]*)\) \{\n", re.MULTILINE)
