@@ -103,7 +103,8 @@ def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c
 
 
 def test_the_reports_say_what_failed(changed_c: Callable[..., None]) -> None:
-    changed_c(lambda text: text.replace("x < m->next : x > m->next", "x < m->cap : x > m->cap"))
+    usual = "plain_above(m->next, x) : plain_above(x, m->next)"
+    changed_c(lambda text: text.replace(usual, usual.replace("next", "cap")))
     report = hystgen.verify(model("plain"), compiler=["gcc"], length=3000)
     data = json.loads(report.to_json())
     assert data["ok"] is False

@@ -175,6 +175,7 @@ def test_declared_dependencies_suffice_for_every_module(python: Path, tmp_path: 
     code = (
         "import importlib, pkgutil, sys, hystgen\n"
         "names = [m.name for m in pkgutil.walk_packages(hystgen.__path__, 'hystgen.')]\n"
+        "names.remove('hystgen.basics.packed')  # extends numba, and is imported only where that is\n"
         "for name in names: importlib.import_module(name)\n"
         "for name in hystgen.__all__: getattr(hystgen, name)\n"
         "print(len(names), *(name for name in sys.argv[1:] if not importlib.util.find_spec(name)))"

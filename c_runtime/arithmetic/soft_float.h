@@ -22,7 +22,7 @@ static inline int32_t hystgen_order(float x) {
         float real;
         int32_t bits;
     } u = {x};
-    return u.bits < 0 ? INT32_MIN - u.bits : u.bits;
+    return u.bits < 0 ? -(u.bits & 0x7fffffff) : u.bits;
 }
 HYSTGEN_APART bool hystgen_above(float a, float b) {
     return hystgen_order(a) > hystgen_order(b);

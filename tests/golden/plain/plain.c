@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 6d03a53e5a098aa8f09e1cae8ee31537c640549abfdae51441799c0fb2b6d4b9, without this line
+ * Text: sha256 644bb5750c151e9f7063f70c641af1ce62e2fd05093bbd35baeea3ae7bad2f9a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -53,7 +53,7 @@ static inline int32_t plain_order(float x) {
         float real;
         int32_t bits;
     } u = {x};
-    return u.bits < 0 ? INT32_MIN - u.bits : u.bits;
+    return u.bits < 0 ? -(u.bits & 0x7fffffff) : u.bits;
 }
 PLAIN_APART bool plain_above(float a, float b) {
     return plain_order(a) > plain_order(b);

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 1344c3c943afa66dc5d42f659e60a54763ed20dd0755befb8b3c35c667835e3e, without this line
+ * Text: sha256 7862811e6b28d2d7f96bdef6e35176a2365b64e456664d796ca0761a6d32cff7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -272,7 +272,7 @@ static inline int32_t two_branches_order(float x) {
         float real;
         int32_t bits;
     } u = {x};
-    return u.bits < 0 ? INT32_MIN - u.bits : u.bits;
+    return u.bits < 0 ? -(u.bits & 0x7fffffff) : u.bits;
 }
 TWO_BRANCHES_APART bool two_branches_above(float a, float b) {
     return two_branches_order(a) > two_branches_order(b);
