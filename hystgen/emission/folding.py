@@ -129,7 +129,8 @@ class _Folding:
         """Do one round. Returns whether anything changed."""
         before = dict(self.functions)
         self._unused_parameters()
-        for name in list(self.functions):
+        # the shortest first: a call can go through a function that returns its argument, a sum perhaps not
+        for name in sorted(self.functions, key=lambda each: len(self.functions[each].statements)):
             self._fold(self.functions[name])
         self._decided()
         for operator in ("forward", "inverse"):
@@ -227,7 +228,11 @@ class _Folding:
         ordered = _forwards(expression) or all(re.fullmatch(r"&[\w>.-]+|\w+", each) for each in arguments)
         if not ordered and not (self._looks(expression) and all(map(self._looks, arguments))):
             return None
-        if not self._answers(function, expression) and not self._converts(function, caller, start, stop):
+        wanted, own = self._wanted(caller, start, stop), self._kind(function, expression) or function.answer
+        sums = not all(map(_single, arguments if expression in function.names else [expression]))
+        if wanted and sums and not self._same(wanted, own):
+            return None  # a sum, unlike a call, is not to be widened (MISRA C:2012, 10.6)
+        if not self._same(wanted, function.answer) and not self._answers(function, expression):
             return None
         for name, kind, argument in zip(function.names, function.types, arguments, strict=True):
             uses = list(re.finditer(rf"(?<![.>\w]){name}\b", expression))
@@ -254,15 +259,16 @@ class _Folding:
             return _single(expression[found.end() :]) and self._same(found[1], function.answer)
         compared = function.answer == "bool" and re.search(r" (?:[=!<>]=|[<>]) ", expression)
         stored = _PLAIN.fullmatch(expression) and expression not in function.names
-        return bool(compared or stored) or self._same(self._kind(function, expression), function.answer)
+        same = _single(expression) and self._same(self._kind(function, expression), function.answer)
+        return bool(compared or stored) or same
 
-    def _converts(self, function: Function, caller: Function, start: int, stop: int) -> bool:
-        """Whether a call's result is the caller's answer, an argument or the first value of a constant, of its type."""
+    def _wanted(self, caller: Function, start: int, stop: int) -> str:
+        """The type of the constant, answer or parameter that a call's result becomes, or empty."""
         before = caller.body[caller.body.rfind(";", 0, start) + 1 : start]
         found = re.search(r"(?:const (\w+) \w+ =|\breturn)\s+(?:[^;{}?]*\?[^;{}:]*(?::\s)?\s*)?$", before)
         if found and re.match(r"\s*[;:]", caller.body[stop:]):
-            return self._same(found[1] or caller.answer, function.answer)
-        return self._same(self._taken(caller.body, start, stop), function.answer)
+            return found[1] or caller.answer
+        return self._taken(caller.body, start, stop)
 
     def _kind(self, caller: Function, argument: str) -> str:
         """The type of an argument as far as it is known, or empty."""
