@@ -205,19 +205,12 @@ class _Folding:
         if function.own and does == "":
             self._calls(function.name, functools.partial(self._spliced, function))
             return
-        if not function.own:
+        if not function.own or function.before.startswith(self._apart):
             return
-        apart, answered = function.before.startswith(self._apart), does.removeprefix("return ").removesuffix(";")
+        answered = does.removeprefix("return ").removesuffix(";")
         places = sum(1 for _ in self._given(function.name))
-        if apart and not (places == 1 and self._brief(answered)):
-            return
         if ";" not in answered and does != answered and (places == 1 or _forwards(answered)):
             self._calls(function.name, functools.partial(self._put, function, answered))
-
-    def _brief(self, expression: str) -> bool:
-        """Whether an expression calls nothing but functions that a compiler inlines."""
-        called = [self.functions.get(each) for each in re.findall(r"(\w+)\(", expression)]
-        return ";" not in expression and all(each and each.before.startswith("static inline") for each in called)
 
     def _put(
         self, function: Function, expression: str, caller: Function, start: int, stop: int, arguments: list[str]
