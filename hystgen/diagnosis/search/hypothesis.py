@@ -44,9 +44,9 @@ _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
 """Parts of the chain after which the compared samples are picked: plays, filters right after, other filters, maps."""
 
 LEVEL_STEPS = 20
-"""Maximum number of Newton steps for the offset in front of a map, a reserve: 2 to 4 are usual, 7 were needed in a fit
-to P-885 records. Behind a sensor whose slope changes fourteenfold, 4 steps leave an error of more than 1e-8 of the
-range, and 5 do not. Set by: test_diagnosis, the tests of written_offset, with 4, 5, 6, 8 and 10 steps."""
+"""[Newton steps] Maximum number for the offset in front of a map, a reserve: 2 to 4 are usual, and a fit to P-885
+records took 7. A rule, to stop where a step is not half the one before, ends too early, since the first steps may grow.
+Set by: `test_diagnosis::test_the_written_offset_..`: 4 steps miss by over 1e-8 of the range; 5, 6, 8 and 10 do not."""
 
 RANK = 1e-10
 """[fraction of the largest singular value] Smaller ones count as zero, as two responses then have nearly the same
