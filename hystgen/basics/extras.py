@@ -9,7 +9,7 @@ import shutil
 import sys
 from pathlib import Path
 
-FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
+FIT = ("scipy", "numba", "llvmlite", "joblib", "threadpoolctl", "rich")
 """Packages of the extra `fit`, needed for every fit."""
 
 PLOT = ("matplotlib",)
