@@ -13,7 +13,7 @@ import pytest
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
-from hystgen.basics.structures import Struct
+from hystgen.basics.structures import Factor, Struct
 from hystgen.compensator import reference
 from hystgen.compensator.chain import moving_fixed, moving_float
 from hystgen.effects.noncongruent import compensator as bends
@@ -99,12 +99,13 @@ PLACES = {"bool", "uint8_t", "uint_least8_t", "uint_least16_t"}
 """Types of members that are flags, indices or bit counts."""
 
 
-def counting_layout(kind: type[Struct]) -> np.dtype[np.void]:
-    """Structured type of a structure with counting numbers."""
+def counting_layout(kind: type[Struct], given: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Structured type of a structure with counting numbers; `given`: its type in an arithmetic."""
     fields: list[Any] = []
-    for name, (word, length) in kind.members().items():
-        if isinstance(word, type):
-            fields.append((name, counting_layout(word)))
+    for name in given.names or ():
+        word, length = kind.members()[name][:2]
+        if given[name].names:
+            fields.append((name, counting_layout(word if isinstance(word, type) else Factor, given[name])))
         else:
             number = np.int64 if word in PLACES or name in INDICES else object
             fields.append((name, number, (length,) if length else ()))
@@ -113,8 +114,8 @@ def counting_layout(kind: type[Struct]) -> np.dtype[np.void]:
 
 def count_in(out: Struct, x: Struct) -> Struct:
     """Copy a structure into one with counting numbers."""
-    for name, (word, _) in type(x).members().items():
-        if isinstance(word, type):
+    for name in x.dtype.names or ():
+        if isinstance(getattr(x, name), Struct):
             count_in(getattr(out, name), getattr(x, name))
         else:
             counts = getattr(out, name).dtype == object
@@ -125,7 +126,7 @@ def count_in(out: Struct, x: Struct) -> Struct:
 def counting(x: Any, name: str = "") -> Any:
     """Tables or memory with counting numbers."""
     if isinstance(x, Struct):
-        return count_in(np.zeros(x.shape, counting_layout(type(x))).view(type(x)), x)
+        return count_in(np.zeros(x.shape, counting_layout(type(x), x.dtype)).view(type(x)), x)
     if isinstance(x, np.ndarray) and name not in INDICES and (x.dtype.kind == "f" or x.dtype == np.int64):
         out = np.empty(x.shape, dtype=object)
         for place in np.ndindex(*x.shape):

@@ -536,7 +536,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
             farthest = max(farthest, abs(whole))
             state = drift.FixedClockState.of([(whole, total - (whole << bits), 0, gained, counted)])
             for lead in (0, ahead):
-                table = drift.FixedClockNumbers.of([one.table])
+                table = drift.FixedClockTable.of([one.table])
                 with jit.plain(), np.errstate(over="raise"):
                     found = int(drift.clock_drift(table, state, 0, np.int64(lead)))
                 t = (n + lead) * Fraction(T)
@@ -546,7 +546,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
         state = drift.FixedClockState.zeros(1)
         with jit.plain():
             for _ in range(20):
-                drift.clock_tick(drift.FixedClockNumbers.of([one.table]), state, 0, 0, 0)
+                drift.clock_tick(drift.FixedClockTable.of([one.table]), state, 0, 0, 0)
         counted = min(20, samples)
         total = slope * counted + twice * (counted * (counted - 1) // 2)
         assert int(state.whole[0]) * 2**bits + int(state.part[0]) == total
@@ -637,7 +637,7 @@ def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, ari
         law, slope = dashpot.yielded(effect, scale, T, float(x) * step)
         with jit.plain():
             found = int(dashpot_fixed.yields(t, x)) / 2.0**t.yield_bits * step
-        unit = 3.0 * step * 2.0 ** (int(t.yields[:, dashpot_fixed.YIELD_LIFT].max()) - t.yield_bits)
+        unit = 3.0 * step * 2.0 ** (int(t.yields.lift.max()) - t.yield_bits)
         assert found <= x * step
         stuck = dashpot.LEAST_YIELD * x * step
         assert abs(found - law) <= dashpot.YIELD_ERROR * law + slope * (least + step) + unit + stuck

@@ -238,15 +238,15 @@ def test_walks_stay_short(walk: str, most: int) -> None:
 C_RUNTIME = PACKAGE.parent / "c_runtime"
 
 BOUNDS = {
-    "lines of hystgen/": (54_130, 38_000),
+    "lines of hystgen/": (54_125, 38_000),
     "lines that ask `.fixed`": (10, 10),
     "lines with `Any`": (272, 300),
     "`fmt: skip`": (1, 30),
-    "tuples of numbered slots": (28, 0),
+    "tuples of numbered slots": (25, 0),
     "files that name an effect outside its folder": (1, 0),
     "class names in several files": (1, 0),
-    "files of C": (91, 120),
-    "lines of C": (7_023, 5_000),
+    "files of C": (90, 120),
+    "lines of C": (6_636, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; nothing raises it."""
 
@@ -300,8 +300,10 @@ def several(files: Mapping[Path, str]) -> set[str]:
 def counted() -> dict[str, int]:
     """The counts of this package that `BOUNDS` limits."""
     from hystgen.effects import CATALOGUE
+    from hystgen.emission import runtime
 
     python, c = texts(PACKAGE, [".py"]), texts(PACKAGE, [".c", ".h"]) | texts(C_RUNTIME, [".c", ".h"])
+    del c[C_RUNTIME / runtime.CHAIN_TYPES]  # written from what `python` declares, as tests/test_runtime.py checks
     outside = named_outside(python | c, PACKAGE / "effects", [*CATALOGUE])
     return {
         "lines of hystgen/": lines(python, ""),

@@ -17,19 +17,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.chain import moving, moving_fixed, moving_float
-from hystgen.effects.plays import (
-    DASHPOT,
-    DILATED,
-    FASTEST,
-    INVERSE_SCALE,
-    LARGEST_INPUT,
-    LEAST_INPUT,
-    NEWTON_TRIES,
-    POLYNOMIAL,
-    SCALE,
-    SECANTS,
-    SEEN,
-)
+from hystgen.effects.plays import DASHPOT, DILATED, FASTEST, NEWTON_TRIES, POLYNOMIAL, SECANTS
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
@@ -64,7 +52,8 @@ def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: 
         return total(w)
 
     t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near, rate_bits=RATE_BITS))
-    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), bent=[min(max(2**RATE_BITS // slope, 1), FASTEST)])
+    rate = [min(max(2**RATE_BITS // slope, 1), FASTEST)]
+    s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), search=SimpleNamespace(rate=rate))
     with jit.plain():
         answer = moving_fixed.search(sum_at, None)(t, s, h)
     return int(answer), tries[0]
@@ -153,13 +142,14 @@ class Exact:
         )
         self.yields, self.curve = ([list(map(Fraction, row)) for row in rows.astype(float).tolist()]
                                    for rows in (t.moving.yields, t.moving.curve))  # fmt: skip
-        self.number = list(map(Fraction, t.moving.number.astype(float).tolist()))
+        number = t.moving.number
+        self.number = {name: Fraction(float(number[name][0])) for name in number.dtype.names}
         self.moves, self.bends = t.moving.moves, t.moving.bends
 
     def reached(self, i: int, w: Fraction) -> Fraction:
         x, q, r = self.play[0], self.play[i], self.r[i]
         if self.moves == DASHPOT:
-            ahead = x + self.number[SEEN] * (w - x) - q
+            ahead = x + self.number["standing_share"] * (w - x) - q
             if abs(ahead) <= r:
                 return q
             begin, *c = [row for row in self.yields if row[0] <= abs(ahead) - r][-1]
@@ -171,8 +161,8 @@ class Exact:
     def bent(self, i: int, z: Fraction) -> Fraction:
         if self.bends != POLYNOMIAL:
             return z
-        xi = z * self.number[INVERSE_SCALE]
-        return z + self.number[SCALE] * sum(c * xi ** (k + 2) for k, c in enumerate(self.curve[i]))
+        xi = z * self.number["inverse_scale"]
+        return z + self.number["scale"] * sum(c * xi ** (k + 2) for k, c in enumerate(self.curve[i]))
 
     def total(self, w: Fraction) -> Fraction:
         plays = range(1, len(self.r))
@@ -181,7 +171,7 @@ class Exact:
     def kinks(self) -> list[Fraction]:
         """Inputs at which a play starts or stops moving with the input, in either direction."""
         x, found = self.play[0], [self.play[0]]
-        seen = self.number[SEEN] if self.moves == DASHPOT else 1
+        seen = self.number["standing_share"] if self.moves == DASHPOT else 1
         for r, first, q in list(zip(self.r, self.first, self.play, strict=True))[1:]:
             wider = first if self.moves == DILATED else 0
             for side in (1, -1):  # which end of the play's band is at q
@@ -221,7 +211,7 @@ def test_plays_are_solved_for_right_up_to_their_kinks(
     t = one.tables(arithmetic, "loop")
     code, s = reference.operations(t, True), reference.new_state(t, True)
     number, rng = t.moving.number, np.random.default_rng(5)
-    ends = Fraction(float(number[LEAST_INPUT])), Fraction(float(number[LARGEST_INPUT]))
+    ends = Fraction(float(number.least_input[0])), Fraction(float(number.largest_input[0]))
     unit = float(np.finfo(real).eps) / 2
     effects = one.parameters.model.effects
     least = moving.slopes(one.cascade, effects, 1.0e-3)[0]

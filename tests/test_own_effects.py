@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +17,9 @@ from modelfiles import BRANCHES, CREEP, PLAYS, head
 import hystgen
 from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, UnsupportedEffectsError
-from hystgen.basics.structures import Factor, Struct
 from hystgen.compensator.chain import bounds, own, tables
 from hystgen.compensator.chain.parts import PARTS
 from hystgen.compensator.chain.run import answers
-from hystgen.compensator.chain.step import QuietState, RampState, SteadyState
 from hystgen.compensator.chained import Compensator
 from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
@@ -33,7 +30,6 @@ from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.plays import slots
-from hystgen.plays.corners.corners_float import PlaceState, PlaysState
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect"
 T = 1e-3
@@ -537,52 +533,9 @@ def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
         for kind in (part.coded() if name == "q31" else part.floating).kinds
     ],
 )
-def test_the_catalogue_s_blocks_are_what_their_c_says(kind: BlockKind, family: runtime.Family) -> None:
-    """Types, names and order of numbers in the run time's headers are those declared in Python."""
-    text = {piece.name: piece.text for piece in runtime._pieces(runtime.CHAIN_TYPES, family.facts)}
-    inside = {"lag_t"}  # another block's memory, replaced by its members
-    signals = replace(family, chain=True)
-
-    def plain(name: str) -> str:
-        """A type without prefix, under the name that it has in this arithmetic."""
-        meant = signals.meaning(name.removeprefix("hystgen_"))
-        return signals.types.get(meant, meant)
-
-    def in_c(name: str) -> list[tuple[str, str, int]]:
-        """Type, name and length of each member, 0 for no array."""
-        code = re.sub(r"/\*.*?\*/", "", text[name], flags=re.DOTALL)
-        found = re.findall(r"(\w+)\s+(\*?\w+)(?:\[(\d+)\])?;", code.partition("{")[2].rpartition("}")[0])
-        own = [(plain(type_), member, int(length or 0)) for type_, member, length in found]
-        return [each for one in own for each in (in_c(f"hystgen_{one[0]}") if one[0] in inside else [one])]
-
-    def in_python(struct: type[Struct]) -> list[tuple[str, str, int]]:
-        members = struct.members().items()
-        return [(plain("factor_t" if kind is Factor else str(kind)), name, length) for name, (kind, length) in members]
-
-    rows = [(f"{kind.name}_{kind.rows.name}_t", f"*{kind.rows.name}", 0)] if kind.rows else []
-    assert in_c(f"hystgen_{kind.tabled}_table_t") == [*rows, *in_python(kind.table)]
-    assert in_c(f"hystgen_{kind.name}_t") == in_python(kind.state)
-    if kind.rows:
-        assert in_c(f"hystgen_{rows[0][0]}") == in_python(kind.rows.table)
-        if kind.rows.state:
-            assert in_c(f"hystgen_{kind.name}_state_t") == in_python(kind.rows.state)
+def test_the_catalogue_s_blocks_have_their_functions_in_c(kind: BlockKind, family: runtime.Family) -> None:
     functions = {piece.name for piece in runtime._pieces(family.chain_blocks, family.facts)}
     assert {f"hystgen_{kind.name}_{verb}" for verb in kind.own} <= functions
-
-
-@pytest.mark.parametrize("arithmetic", ["float32", "q31"])
-def test_the_memory_of_a_chain_is_named_as_in_c(arithmetic: str) -> None:
-    """Compared are the memory of plays, and the state that a step keeps for a slew limit and a lag."""
-    family = runtime.FAMILIES[arithmetic]
-    text = {piece.name: piece.code for piece in runtime._pieces((*family.states, *runtime.CHAIN_TYPES), family.facts)}
-    same: list[tuple[str, type[Struct]]] = [
-        ("place", PlaceState), ("ramp", RampState), ("quiet", QuietState), ("steady", SteadyState),
-    ]
-    if family.kind == "float":
-        same.append(("plays", PlaysState))
-    for name, struct in same:
-        named = re.findall(r"\w+ (\w+);", text[f"hystgen_{name}_t"].partition("{")[2].rpartition("}")[0])
-        assert set(named) - {"here"} == set(struct.members()), name
 
 
 def test_a_block_says_what_it_does_to_signals() -> None:

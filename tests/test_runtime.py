@@ -6,9 +6,12 @@ They compile without warnings, alone and in units, and give the textbook model a
 from __future__ import annotations
 
 import ast
+import itertools
+import os
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import cffi
@@ -21,7 +24,7 @@ from hystgen.compensator import reference, step, step_fixed, step_float
 from hystgen.compensator.chain import step as chain_step
 from hystgen.compensator.chain import step_fixed as chain_step_fixed
 from hystgen.compensator.chain import step_float as chain_step_float
-from hystgen.emission import runtime
+from hystgen.emission import declarations, runtime
 from hystgen.emission.calls import emitted_files
 from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
@@ -273,6 +276,36 @@ def test_a_file_opens_with_a_paragraph(path: Path) -> None:
     """The paragraph says what the file does, and comes before its first line of code."""
     text = path.read_text(encoding="ascii")
     assert re.match(r"/\*(?:[^*]|\*(?!/)){20,}\*/\n", text) or path.name == "part.c"
+
+
+def types_of_effects() -> str:
+    """The header with the types of models with effects, from their declarations; those that are the same class in every
+    arithmetic appear once."""
+    texts = [{piece.name: piece.text for piece in declarations.pieces(kind)} for kind in ("fixed", "float")]
+    found = [
+        "/* The types of models with effects, written from the structures in Python that the reference uses:\n"
+        "   HYSTGEN_UPDATE_GOLDEN=1 pytest tests/test_runtime.py -k declared */",
+        "#ifndef HYSTGEN_CHAIN", "#define HYSTGEN_CHAIN", "#endif", '#include "arithmetic/numbers.h"',
+        "#ifndef HYSTGEN_CHAIN_TYPES_H", "#define HYSTGEN_CHAIN_TYPES_H", "",
+    ]
+    names = dict.fromkeys(name for text in texts for name in text)
+    for alike, group in itertools.groupby(names, lambda name: texts[0].get(name) == texts[1].get(name)):
+        of_group = list(group)
+        if alike:
+            found += [texts[0][name] for name in of_group]
+        else:
+            fixed, floating = ([text[name] for name in of_group if name in text] for text in texts)
+            found += ["#ifdef HYSTGEN_FIXED", *fixed, *["#else"] * bool(floating), *floating, "#endif", ""]
+    return "\n".join([*found, "#endif", ""])
+
+
+def test_the_header_of_types_is_what_is_declared() -> None:
+    """It is for editors; emission writes the same declarations."""
+    path = RUNTIME / runtime.CHAIN_TYPES
+    if os.environ.get("HYSTGEN_UPDATE_GOLDEN"):
+        path.write_text(types_of_effects(), encoding="ascii")
+        subprocess.run([Path(sys.executable).with_name("clang-format"), "-i", path], check=True)
+    assert path.read_text(encoding="ascii").split() == types_of_effects().split()
 
 
 FORMS = """#ifndef HYSTGEN_A_C

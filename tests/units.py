@@ -131,7 +131,7 @@ def _compensator(name: str, arithmetic: str, engine: str) -> EmittedModel:
 def _states(one: EmittedModel) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
     if one.glue:
-        return [runtime.CHAIN_TYPES[1]] * one.variant.chain
+        return [runtime.CHAIN_TYPES] * one.variant.chain
     return [runtime.CORNER_STATE]
 
 
@@ -162,7 +162,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     one = _compensator(name, arithmetic, engine)
     chain, loop = one.variant.chain, one.family.loop
     facts = one.family.facts | one.variant.facts | one.kernel_facts
-    types = [*([f'#include "{runtime.CHAIN_TYPES[0]}"'] * chain), *(one.glue.states.values() if one.glue else ())]
+    types = [state.text for state in one.glue.states.values()] if one.glue else []
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     text = "\n".join(
         [

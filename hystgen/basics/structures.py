@@ -1,18 +1,21 @@
 """Structures of named numbers, declared once for both the arrays of the bit-exact reference and the structs in C.
 
     class LagState(Struct):
-        high: Real  # comments say what a number is, as in C
-        low: Real
+        '''A lag that is led.'''
+
+        high: Signal = note("x, the response to a zero-order-hold drive;")
+        low: Signal = note("its rounding remainder")
 
 `LagState.zeros(3, np.float32)`, a single structured array, is the memory of three lags. `s.high[1]` is the second lag's
-`high`, in Python and in compiled code alike, since numba accepts structured arrays.
+`high`, in Python and in compiled code alike, since numba accepts structured arrays. `hystgen.emission.declarations`
+writes the struct in C from the same class: its docstring and the notes are the comments there.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Annotated, Any, Protocol, Self, TypeAlias, get_args, get_origin, get_type_hints, overload
+from typing import Annotated, Any, NamedTuple, Protocol, Self, TypeAlias, get_args, get_origin, get_type_hints, overload
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -38,6 +41,13 @@ class NumberArray(Protocol):
     def tolist(self) -> Any: ...
 
 
+class FactorArray(NumberArray, Protocol):
+    """An array of factors, as numbers or in two parts."""
+
+    mantissa: NumberArray
+    shift: NumberArray
+
+
 Real: TypeAlias = Annotated[NumberArray, "real_t"]
 Flag: TypeAlias = Annotated[NumberArray, "bool"]
 Int64: TypeAlias = Annotated[NumberArray, "int64_t"]
@@ -46,26 +56,59 @@ UInt32: TypeAlias = Annotated[NumberArray, "uint32_t"]
 UInt8: TypeAlias = Annotated[NumberArray, "uint8_t"]
 Signal: TypeAlias = Annotated[NumberArray, "signal_t"]  # a real in floating point, int64_t in fixed point
 Narrow: TypeAlias = Annotated[NumberArray, "narrow_t"]  # a real in floating point, int32_t in fixed point
+Play: TypeAlias = Annotated[NumberArray, "play_t"]  # a real in floating point, int32_t in fixed point
+Reach: TypeAlias = Annotated[NumberArray, "reach_t"]  # a real in floating point, in fixed point wider than a code
+Literal: TypeAlias = Annotated[NumberArray, "signal_t", 0, "python"]  # a constant that is not a member in C
+AnyFactor: TypeAlias = Annotated[FactorArray, "factor_t"]  # a real in floating point, a `Factor` in fixed point
+# members in only one kind of arithmetic
+FloatReal: TypeAlias = Annotated[NumberArray, "real_t", 0, "float"]
+FloatSignal: TypeAlias = Annotated[NumberArray, "signal_t", 0, "float"]
+FixedSignal: TypeAlias = Annotated[NumberArray, "signal_t", 0, "fixed"]
+FixedFactor: TypeAlias = Annotated[FactorArray, "factor_t", 0, "fixed"]
+FixedUInt8: TypeAlias = Annotated[NumberArray, "uint8_t", 0, "fixed"]
 Number: TypeAlias = Annotated[NumberArray, "number_t"]
 Count: TypeAlias = Annotated[NumberArray, "uint_least16_t"]
 SmallCount: TypeAlias = Annotated[NumberArray, "uint_least8_t"]
+Int32s: TypeAlias = Annotated[NumberArray, "const int32_t *"]  # pointers: only in C
+UInt8s: TypeAlias = Annotated[NumberArray, "const uint8_t *"]
 TwoReals: TypeAlias = Annotated[NumberArray, "real_t", 2]
 FourInt32: TypeAlias = Annotated[NumberArray, "int32_t", 4]
 FourNarrow: TypeAlias = Annotated[NumberArray, "narrow_t", 4]
 
 
+OF_ARITHMETIC = frozenset(["real_t", "signal_t", "narrow_t", "play_t", "reach_t", "factor_t"])
+"""Types that depend on the arithmetic."""
+
+
+class Member(NamedTuple):
+    """A member of a structure: another structure or the C type without its prefix, an array's length, or 0, and its
+    comment in C; `only`: the kind of arithmetic in which it is a member, empty for both; "python": not in C."""
+
+    kind: type[Struct] | str
+    length: int = 0
+    only: str = ""
+    note: str = ""
+
+
+def note(words: str) -> Any:
+    """The comment of a member."""
+    return words
+
+
 class Struct(np.ndarray[Any, np.dtype[Any]]):
     """An array of structures of one kind; each member is an array of numbers or structures.
 
-    A `Real`, `Signal` or `Narrow` has the type of the arithmetic. Others are int64 here, however narrow they are in C.
+    Members of `OF_ARITHMETIC` have the type of the arithmetic. Others are int64 here, however narrow they are in C.
     """
 
     def __array_finalize__(self, _: object) -> None:
         """Give a new array its members as attributes."""
         if self.dtype.names:
             plain = self.view(np.ndarray)
-            for name, (kind, _length) in self.members().items():
-                setattr(self, name, plain[name].view(kind) if isinstance(kind, type) else plain[name])
+            for name in self.dtype.names:
+                kind, member = self.members()[name].kind, plain[name]
+                view = member.view(kind if isinstance(kind, type) else Factor) if member.dtype.names else member
+                setattr(self, name, view)
 
     def __setstate__(self, state: Any) -> None:
         """Unpickle, then add the members: the array had no fields when it was created."""
@@ -74,28 +117,29 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
 
     @classmethod
     @functools.cache
-    def members(cls) -> Mapping[str, tuple[type[Struct] | str, int]]:
-        """Members by name, in order: a structure or the C type without its prefix, and an array's length, or 0."""
-        found: dict[str, tuple[type[Struct] | str, int]] = {}
+    def members(cls) -> Mapping[str, Member]:
+        """Members by name, in order."""
+        found: dict[str, Member] = {}
         for name, hint in get_type_hints(cls, include_extras=True).items():
-            if get_origin(hint) is Annotated:
-                kind, *length = get_args(hint)[1:]
-                found[name] = kind, sum(length)
-            elif isinstance(hint, type) and issubclass(hint, Struct):
-                found[name] = hint, 0
+            member = get_args(hint)[1:] if get_origin(hint) is Annotated else (hint,)
+            found[name] = Member(*member)._replace(note=getattr(cls, name, ""))
         return found
 
     @classmethod
     @functools.cache
     def layout(cls, real: np.dtype[np.generic]) -> np.dtype[np.void]:
-        """numpy's structured type in an arithmetic whose numbers have the type `real`."""
+        """numpy's structured type in an arithmetic whose numbers have the type `real`, an integer in fixed point."""
         taken = [name for name in cls.members() if hasattr(np.ndarray, name)]
         assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
-        fields: list[Any] = []
-        for name, (kind, length) in cls.members().items():
-            number = real if kind in ("real_t", "signal_t", "narrow_t") else np.int64
-            number = kind.layout(real) if isinstance(kind, type) else np.dtype(number)
-            fields.append((name, number, (length,)) if length else (name, number))
+        fields: list[tuple[str, DTypeLike, tuple[int, ...]]] = []
+        floating = real.kind == "f"
+        for name, (kind, length, only, _) in cls.members().items():
+            if only == ("fixed" if floating else "float"):
+                continue
+            structure = Factor if kind == "factor_t" and not floating else kind
+            number = np.dtype(real if kind in OF_ARITHMETIC else np.int64)
+            number = structure.layout(real) if isinstance(structure, type) else number
+            fields.append((name, number, (length,) if length else ()))
         return np.dtype(fields)
 
     @classmethod
@@ -128,7 +172,7 @@ def added(s: TwoParts, j: int, change: Scalar) -> Scalar:
 
 
 class Factor(Struct):
-    """A real factor, mantissa / 2^shift."""
+    """A real factor: mantissa / 2^shift."""
 
     mantissa: Int32
     shift: UInt8

@@ -10,9 +10,40 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import inside, jit
+from hystgen.basics.structures import Count, Int32, Int32s, Struct, UInt8, UInt8s, note
 from hystgen.front.curve import curve
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals
+
+
+class BendCurve(Struct):
+    """A smooth limit, or its inverse, as a piecewise polynomial."""
+
+    knot: Int32s
+    scale: UInt8s
+    coefficient: Int32s
+    least: Int32 = note("argument")
+    most: Int32
+    pieces: Count
+    degree: UInt8
+    drop: UInt8 = note("bits of a signal that an argument leaves out,")
+    lift: UInt8 = note("and bits that a value leaves out")
+
+
+class SmoothLimit(Struct):
+    """A smooth limit."""
+
+    forward: BendCurve
+    inverse: BendCurve
+
+
+class Bump(Struct):
+    """What bending adds to the value of a play, as a piecewise polynomial of the same form."""
+
+    knot: Int32s
+    scale: UInt8s
+    coefficient: Int32s
+    pieces: Count
 
 
 class BendPiece(Protocol):

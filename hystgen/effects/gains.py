@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 from hystgen.arithmetic.factors import multiplied, times
 from hystgen.basics.jit import Action, Answer, Scalar, jit, zero
-from hystgen.basics.structures import Factor, NumberArray, Signal, Struct, TwoParts
+from hystgen.basics.structures import Factor, Literal, NumberArray, Struct, TwoParts
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 """[times] A gain is kept between these: a gain beyond them that the caller sets is due to a faulty sensor or a wrong
@@ -60,12 +60,12 @@ class Gains(NamedTuple):
 
 
 class GainLimits(Struct):
-    """The gains 1 and 2, and the limits of a gain that is set: constants that are not in a table in C."""
+    """The gains 1 and 2, and the limits of a gain that is set."""
 
-    one: Signal
-    two: Signal
-    least: Signal
-    largest: Signal
+    one: Literal
+    two: Literal
+    least: Literal
+    largest: Literal
 
 
 def following(by: Gains) -> Answer:

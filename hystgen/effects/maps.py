@@ -12,9 +12,10 @@ import numpy as np
 from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import inside, jit
+from hystgen.basics.structures import Factor, Int64, Struct
 from hystgen.effects.base import Array, Effect, Run
 from hystgen.effects.bend import Bends, bend
-from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
+from hystgen.plays.slots import DEAD_ZONE, TANH, Counts
 
 
 class MapErrors(NamedTuple):
@@ -115,19 +116,25 @@ class MapPart:
 
 # ---------------------------------------------------------------- maps.c
 
-LOWER, UPPER, GIVE, INVERSE_GIVE = 0, 1, 2, 4
+
+class FixedStops(Struct):
+    """Stops, and the slope beyond them."""
+
+    lower: Int64
+    upper: Int64
+    give: Factor
+    inverse_give: Factor
 
 
 class MapTables(NamedTuple):
     """All maps, in order from the plays.
 
-    `kind` (k,): TANH for a curve, or DEAD_ZONE for linear pieces; `piece` (k, 6): for linear pieces, the ends between
-    which nothing changes, and the slope beyond them and its reciprocal, as factors. `bends`: two curves for each map,
+    `kind` (k,): TANH for a curve, or DEAD_ZONE for linear pieces with `stops` (k,); `bends`: two curves for each map,
     forward and inverse.
     """
 
     kind: Counts
-    piece: Reals
+    stops: FixedStops
     bends: Bends
 
     @property
@@ -142,10 +149,10 @@ class MapTables(NamedTuple):
 
 
 @jit
-def straight(t: MapTables, j: int, x: int, slope: int) -> int:
-    """x, with another slope beyond the ends."""
-    within = inside(x, t.piece[j, LOWER], t.piece[j, UPPER])
-    return within + times(x - within, t.piece[j, slope], t.piece[j, slope + 1])
+def straight(t: MapTables, j: int, x: int, slope: Factor) -> int:
+    """x, with another slope beyond the stops."""
+    within = inside(x, t.stops.lower[j], t.stops.upper[j])
+    return within + times(x - within, slope.mantissa[j], slope.shift[j])
 
 
 @jit
@@ -156,7 +163,7 @@ def maps_forward(t: MapTables, x: int) -> int:
         if t.kind[j] == TANH:
             y, _ = bend(t.bends, 2 * j, y)
         else:
-            y = straight(t, j, y, GIVE)
+            y = straight(t, j, y, t.stops.give)
     return y
 
 
@@ -170,5 +177,5 @@ def maps_inverse(t: MapTables, y: int) -> tuple[int, int]:
             x, one = bend(t.bends, 2 * j + 1, x)
             limited = limited | one
         else:
-            x = straight(t, j, x, INVERSE_GIVE)
+            x = straight(t, j, x, t.stops.inverse_give)
     return x, limited

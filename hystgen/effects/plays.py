@@ -12,6 +12,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.structures import FourInt32, Int32, Int64, Literal, Real, Struct, UInt8, UInt32, note
 from hystgen.effects.base import Array
 from hystgen.effects.bend import Bends
 from hystgen.effects.part import Function
@@ -23,12 +24,6 @@ F = TypeVar("F")
 PLAIN, DILATED, RELAXING, DASHPOT = range(4)
 STRAIGHT, POLYNOMIAL, CENTRE = range(3)
 """How plays move, and how they are bent."""
-
-(
-    SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, AMPLITUDE, STEEPEST, TANH_CENTRE,
-    LEAST_INPUT, LARGEST_INPUT, HALF, ONE, RATE, CLOSE, SEEN,
-) = range(15)
-"""Indices into `MovingTables.number`."""
 
 NEWTON_TRIES = 8
 """Tries of a search in floating point by Newton's method, before it starts to halve the remaining interval: 1 or 2 are
@@ -44,6 +39,59 @@ FASTEST = 2**31 - 1
 """[steps of the input per 2^rate_bits of the sum] Largest rate: the largest whose product with a word fits 63 bits."""
 
 
+class SearchState(Struct):
+    """What a search for the input of the plays starts from."""
+
+    slope: Real = note("change in their sum per unit change in their input, in steady motion")
+
+
+class FixedSearchState(Struct):
+    """A search between two inputs of the plays, `low` and one above `top`, which are not tried again, for the one at
+    which their sum is `total`. It lies in the memory of an operator, not on its stack."""
+
+    total: Int64
+    short_of: Int64 = note("shortfall of the sum at `low`, or 0 if `low` is below all inputs,")
+    over: Int64 = note("and its excess above `top`, or -1")
+    found: Int64 = note("sum at the input tried last,")
+    last: Int64 = note("and at the one before")
+    rate: UInt32 = note("change in the input per unit change in the sum; kept for the next search")
+    input: Int32 = note("the one tried last,")
+    before: Int32 = note("and the one before")
+    low: Int32
+    top: Int32
+    tries: UInt8 = note("by secants")
+
+
+class FixedYield(Struct):
+    """A piece of the yield of a nonlinear dashpot: its start, the left shift that scales its length to 2^31, and the
+    coefficients of its cubic, without their lowest `lift` bits."""
+
+    begin: UInt32
+    c: FourInt32
+    scale: UInt8
+    lift: UInt8
+
+
+class MovingNumbers(Struct):
+    """Numbers of moved or bent plays in floating point, in C macros."""
+
+    scale: Real = note("largest threshold")
+    inverse_scale: Real
+    centre: Real = note("of the loops with another weight")
+    inverse_width: Real
+    bump: Real = note("how much, times the width")
+    amplitude: Real = note("share of more weight at the centre")
+    steepest: Real = note("change of a contribution there")
+    tanh_centre: Real = note("so that a play at 0 contributes nothing")
+    least_input: Real = note("of the plays, for a search")
+    largest_input: Real
+    half: Literal
+    one: Literal
+    rate: Real = note("reciprocal of the sum's mean slope")
+    close: Real = note("distance of the sum at which a search ends")
+    standing_share: Real = note("share of a step after which the input is taken as standing still")
+
+
 class MovingTables(NamedTuple):
     """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
     unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
@@ -54,7 +102,7 @@ class MovingTables(NamedTuple):
     first: Reals
     second: Reals
     curve: Reals
-    number: Reals
+    number: MovingNumbers
     halves: int
     turns: int
     scanned: int  # 1 for viscous plays with one time constant and no bend
@@ -73,8 +121,8 @@ class FixedMovingTables(NamedTuple):
     tries; `near`: smallest change of the sum for half a step of the input; `rate_bits`: a rate is 2^rate_bits steps of
     the input per change of the sum, `FASTEST` at the smallest slope; `relaxed`: tables of plays with the slopes that
     viscous plays with one time constant have in a step; `bump`: curves of bent plays minus the plays themselves, with
-    `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields` (K, 7): yields of
-    a nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a factor."""
+    `bump_bits` bits below a step of their input; `bump_of` (n + 1,): the curve of each play; `yields` (K,): yields of a
+    nonlinear dashpot with `yield_bits` bits below a step, for stretches up to `stretch`; `seen`: a factor."""
 
     moves: int
     bends: int
@@ -88,7 +136,7 @@ class FixedMovingTables(NamedTuple):
     bump: Bends
     bump_of: Counts
     bump_bits: int
-    yields: Reals
+    yields: FixedYield
     yield_bits: int
     stretch: int
     seen: Reals
@@ -140,18 +188,18 @@ class Mover(Protocol):
     def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]: ...
     def whole_yields(
         self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
-    ) -> list[tuple[int, ...]]: ...
+    ) -> list[tuple[object, ...]]: ...
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float: ...
     def disorder(self, rows: Array, top: float) -> float: ...
 
 
 class Bent(NamedTuple):
-    """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`; `bump`
-    of play i > 0: a key that plays with the same bend share, and its contribution minus the play itself."""
+    """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingNumbers`; `bump` of
+    play i > 0: a key that plays with the same bend share, and its contribution minus the play itself."""
 
     bends: int
     curve: Array
-    numbers: Mapping[int, float]
+    numbers: Mapping[str, float]
     bump: Callable[[int], tuple[object, Callable[[float], float]]]
 
 

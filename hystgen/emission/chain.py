@@ -6,29 +6,25 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from hystgen.emission.compensator import ConstantTable, EmittedStage, Field, Form, Glue, Tabled, Writer
-from hystgen.emission.runtime import Variant, template
-from hystgen.emission.text import literal, operand
+from hystgen.emission.compensator import (
+    ConstantTable,
+    EmittedStage,
+    Form,
+    Glue,
+    Tabled,
+    Writer,
+    macros_of,
+    members,
+)
+from hystgen.emission.runtime import Field, Variant, template
+from hystgen.emission.text import operand
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
-    from hystgen.basics.structures import Struct
     from hystgen.compensator.chain.layout import ChainTables
     from hystgen.effects.kinds import BlockKind, Constants
-
-NUMBERS = {
-    "OUTPUT_OFFSET": "added to every displacement",
-    "FARTHEST_OFFSET": "largest additional offset that can be set",
-    "SLEW_RISING": "largest move of the drive per step",
-    "SLEW_FALLING": "",
-    "SLEW_RISING_REST": "and its rounding remainder",
-    "SLEW_FALLING_REST": "",
-}
-"""Macros for members of `ChainTables.number`."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class NamedBlock:
         kind, rows = self.kind, self.kind.rows
         found = [Field(f"{kind.name}_t", self.name)]
         if rows and rows.state:
-            found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", count=len(self.constants.rows)))
+            found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", length=str(len(self.constants.rows))))
         return found
 
     def call(self, verb: str, x: str) -> str:
@@ -82,17 +78,6 @@ class NamedBlock:
         rows = [", ".join(members(kind.rows.table, row)) for row in constants.rows]
         of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows, len(rows))
         return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
-
-
-def members(kind: type[Struct], one: np.void) -> list[str]:
-    """The members of a structure as written in C."""
-    return [_written(one[name]) for name in kind.members()]
-
-
-def _written(number: Any) -> str:
-    if isinstance(number, np.void):
-        return f"{{{', '.join(_written(number[name]) for name in number.dtype.names or ())}}}"
-    return f"{{{', '.join(map(literal, number))}}}" if isinstance(number, np.ndarray) else literal(number)
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[NamedBlock], list[NamedBlock]]:
@@ -169,8 +154,7 @@ def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> T
     """Tables and macros of a model's effects, besides those of its stages of saturation."""
     largest = max(map(chain.blocks, chain.sides), key=len)  # the forward operator has the inverse's blocks plus modes
     tables = [table for block in largest for table in block.tables(writer)]
-    numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
-    constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
+    constants = macros_of(t.number)
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "drive samples held in the delay"))
     if "forward" in chain.sides and t.of("wait").samples:
@@ -179,7 +163,6 @@ def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> T
         tables.append(form.factors("tap", t.tap, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
-        ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest alternates"),
         ("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"),
         *form.effects(t),
     ]
@@ -212,7 +195,7 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
     waiting = 0 if inverse else t.waiting
     arrived = Field("fine_t", "drive", "last output of the drive side")
     answer = "drive" if inverse else "displacement" if t.chain else "output"
-    length = "" if kept else "HYSTGEN_N_PLAYS + 1"
+    length = str(plays + 1 + kept) if kept else "HYSTGEN_N_PLAYS + 1"
     searched = [Field("bool", "sought", "a solution has been found since the plays last followed")] * inverse
     return [
         *[Field("real_t", "pending", "drive sent but not yet in the memory")] * inverse,
@@ -227,8 +210,8 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         *(field for block in blocks for field in block.fields),
         *[Field("quiet_t", "quiet")] * (inverse and t.quiet),
         *[Field("steady_t", "steady")] * (inverse and t.turning),
-        *[Field("signal_t", "line", "references, the newest last", taps)] * (inverse and taps > 0),
-        *[Field("real_t", "waiting", "drives", waiting), Field("unsigned int", "oldest", "drive")] * (waiting > 0),
+        *[Field("signal_t", "line", "references, the newest last", str(taps))] * (inverse and taps > 0),
+        *[Field("real_t", "waiting", "drives", str(waiting)), Field("unsigned int", "oldest", "drive")] * (waiting > 0),
         Field("bool", "ascending", "direction of the drive's last move"),
         Field("bool", "moving", "a drive has been applied"),
         *[
@@ -240,9 +223,9 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         ] * inverse,
         Field("unsigned int", "status"),
         *([*searched, *form.corners(inverse, plays)] if t.engine == "corners"
-          else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
+          else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), length)]),
         *[
-            Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS"),
+            Field("signal_t", "bent", "contribution of each play", "HYSTGEN_N_PLAYS"),
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
         ] * t.bent,

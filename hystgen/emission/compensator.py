@@ -6,14 +6,18 @@ from __future__ import annotations
 import math
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
+import numpy as np
+
+from hystgen.basics.structures import Struct
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime
 from hystgen.emission.options import Options
+from hystgen.emission.runtime import LANGUAGE, Field, Piece, declared_type
 from hystgen.emission.text import WIDTH, Number, braces, comment_text, constant, literal, operand, structure, table
 from hystgen.plays.slots import Reals
 
@@ -24,10 +28,6 @@ if TYPE_CHECKING:
 
 Macro: TypeAlias = tuple[str, str, str]
 """A macro of a model: its name without the model's prefix, its value, and a comment."""
-
-STANDARD = frozenset(["int32_t", "uint32_t", "uint16_t", "uint8_t"])
-"""Types of <stdint.h> that appear in tables."""
-
 
 @dataclass(frozen=True)
 class ConstantTable:
@@ -47,24 +47,6 @@ class EmittedStage:
     arrays: tuple[ConstantTable, ...]
     table: str
     limited: str = ""
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of an instance. Its type is one of the run time's, without prefix, or a standard one; with a `count` it
-    is an array, whose length is written as `length` in C if that is given."""
-
-    kind: str
-    name: str
-    comment: str = ""
-    count: int = 0
-    length: str = ""
-
-    def text(self) -> str:
-        """Its declaration in C."""
-        kind = f"hystgen_{self.kind}" if self.kind.endswith("_t") else self.kind
-        size = f"[{self.length or self.count}]" if self.count else ""
-        return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
 @dataclass(frozen=True)
@@ -114,7 +96,7 @@ class Writer:
         return self._table(own, text, [(kind, len(values)) for _, values in columns])
 
     def _typed(self, kind: str) -> str:
-        return kind if kind in STANDARD else f"{self.prefix}_{kind}"
+        return kind if kind in LANGUAGE else f"{self.prefix}_{kind}"
 
     def _declared(self, kind: str, own: str, sizes: Sequence[int]) -> str:
         return f"{self._typed(kind)} {self.name}_{own}" + "".join(f"[{size}]" for size in sizes)
@@ -131,20 +113,21 @@ def filled(entries: Iterable[str]) -> str:
     return "\n".join(lines).replace("\0", " ")
 
 
-def entries(values: Iterable[Number], letters: str = "") -> str:
-    """Numbers in a table as written in C; `letters`: r for a plain number, f for a factor, c for four coefficients."""
-    rest = iter(values)
-    if not letters:
-        return ", ".join(map(literal, rest))
-    return ", ".join(_entry(letter, rest) for letter in letters)
+def entries(values: Iterable[Number]) -> str:
+    """Numbers in a table as written in C."""
+    return ", ".join(map(literal, values))
 
 
-def _entry(letter: str, rest: Iterator[Number]) -> str:
-    if letter == "f":
-        return f"{{{literal(next(rest))}, {next(rest)}}}"
-    if letter == "c":
-        return f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}"
-    return literal(next(rest))
+def members(kind: type[Struct], one: np.void | Mapping[str, object]) -> list[str]:
+    """The members of a structure as written in C."""
+    names = one if isinstance(one, Mapping) else one.dtype.names or ()
+    return [_written(one[name]) for name in names if kind.members()[name].only != "python"]
+
+
+def _written(number: Any) -> str:
+    if isinstance(number, np.void):
+        return f"{{{', '.join(_written(number[name]) for name in number.dtype.names or ())}}}"
+    return f"{{{entries(number)}}}" if isinstance(number, np.ndarray) else literal(number)
 
 
 Tabled: TypeAlias = tuple[list[ConstantTable], list[Macro]]
@@ -268,6 +251,14 @@ class Form(ABC):
         return ""
 
 
+def macros_of(numbers: Struct) -> list[Macro]:
+    """Macros for the members of a structure."""
+    return [
+        (name.upper(), f"{numbers[name][0]}u" if kind == "uint8_t" else operand(numbers[name][0]), note)
+        for name, (kind, _, only, note) in type(numbers).members().items() if only != "python"
+    ]
+
+
 def macros(numbers: Tables | FixedTables) -> list[Macro]:
     """Macros that every arithmetic has."""
     ends = numbers.limits
@@ -319,22 +310,19 @@ class Glue:
     calls: Mapping[str, Sequence[str]]
 
     @property
-    def states(self) -> dict[str, str]:
+    def states(self) -> dict[str, Piece]:
         """The type of an instance by operator."""
-        return {op: _state(op, fields) for op, fields in self.fields.items()}
+        words = {"inverse": "reference in, drive out", "forward": "drive in, displacement out"}
+        owned = "Plain data, owned by the caller."
+        return {
+            op: declared_type(f"{op}_t", f"/* One {op} operator: {words[op]}. {owned} */", fields)
+            for op, fields in self.fields.items()
+        }
 
     def named(self, names: Mapping[str, Collection[str]]) -> Glue:
         """A copy with only the fields that each operator's functions use."""
         fields = {op: [each for each in found if each.name in names[op]] for op, found in self.fields.items()}
         return replace(self, fields=fields)
-
-
-def _state(op: str, fields: Sequence[Field]) -> str:
-    """The type of an instance."""
-    words = "reference in, drive out" if op == "inverse" else "drive in, displacement out"
-    top = f"/* One {op} operator: {words}. Plain data, owned by the caller. */"
-    body = "\n".join(f"    {field.text()}" for field in fields)
-    return f"{top}\ntypedef struct {{\n{body}\n}} hystgen_{op}_t;\n"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
@@ -12,7 +11,7 @@ from hystgen.compensator import engines
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.compensator import AnyTables, ConstantTable
 from hystgen.emission.options import Options
-from hystgen.emission.runtime import Family, Member, Piece
+from hystgen.emission.runtime import LANGUAGE, Family, Field, Piece
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
@@ -93,15 +92,15 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
 
     `pieces`: ordered so that a type comes before those that contain it; `lengths`: values of macros in array lengths.
     """
-    plain = {"bool": 1, "unsigned int": layout.integer} | LANGUAGE
+    plain = {**LANGUAGE, "unsigned int": layout.integer}
     plain |= {name: LANGUAGE[kind] for name, kind in {"real_t": family.real, **family.types}.items()}
     found = {name: (size, size) for name, size in plain.items()}
 
-    def field(member: Member) -> Size:
-        if member.pointer:
+    def field(member: Field) -> Size:
+        if "*" in member.kind:
             return layout.pointer, layout.pointer
         size, alignment = found[family.meaning(member.kind)]
-        return size * math.prod(_length(each, lengths) for each in member.lengths), alignment
+        return size * _length(member.length, lengths), alignment
 
     for piece in pieces:
         if members := piece.members:
@@ -112,14 +111,9 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
     return found
 
 
-LANGUAGE = {"float": 4, "double": 8, "int64_t": 8, "int32_t": 4, "int16_t": 2, "uint32_t": 4, "uint16_t": 2,
-            "uint8_t": 1, "uint_least16_t": 2, "uint_least8_t": 1}
-"""Bytes of standard types, which are also their alignments."""
-
-
 def _length(words: str, lengths: Mapping[str, int]) -> int:
-    """The length of an array: a sum of numbers and macros."""
-    return sum(lengths[term] if term in lengths else int(term) for term in words.split(" + "))
+    """The length of an array, a sum of numbers and macros; 1 without."""
+    return sum(lengths[term] if term in lengths else int(term) for term in (words or "1").split(" + "))
 
 
 def _constants(contents: Iterable[tuple[str, int]], known: Mapping[str, Size], family: Family, plays: int = 1) -> int:

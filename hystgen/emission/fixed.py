@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from hystgen.chain.static import StaticModel
@@ -13,7 +13,6 @@ from hystgen.emission.compensator import (
     ConstantTable,
     EmittedStage,
     Errors,
-    Field,
     Form,
     Macro,
     Numbers,
@@ -22,9 +21,11 @@ from hystgen.emission.compensator import (
     drives,
     entries,
     macros,
+    members,
     pointers,
 )
 from hystgen.emission.options import Options
+from hystgen.emission.runtime import Field
 from hystgen.emission.text import Number, comment_text, literal, operand
 from hystgen.front.curve import FORWARD, INVERSE
 from hystgen.front.tanh.model import TanhEnvelope
@@ -134,7 +135,7 @@ class FixedForm(Form):
         ]
         if plays.scanned:
             arrays = [
-                writer.line("factor_t", f"relaxing_{name}", _factor(rows[1, :]))
+                writer.line("factor_t", f"relaxing_{name}", entries(rows[1, :]))
                 for name, rows in (("late", plays.first), ("kept", plays.second))
             ]
             if inverse:
@@ -148,9 +149,9 @@ class FixedForm(Form):
             self.factors(name, rows, writer) for name, rows in zip(names, (plays.first, plays.second), strict=False)
         ]
         if plays.moves == moving.DASHPOT:
-            rows = [entries(row, "rcrr") for row in plays.yields]
+            rows = [", ".join(members(type(plays.yields), row)) for row in plays.yields]
             arrays.append(writer.rows("yield_t", "yields", rows, len(rows)))
-            arrays.append(writer.line("factor_t", "standing_share", _factor(plays.seen)))
+            arrays.append(writer.line("factor_t", "standing_share", entries(plays.seen)))
             numbers += [
                 ("YIELDS", f"{len(rows)}u", "pieces of the yield of a dashpot"),
                 ("YIELD_BITS", f"{plays.yield_bits}u", "of a yield below a step of the plays' input"),
@@ -167,21 +168,10 @@ class FixedForm(Form):
         return arrays, numbers
 
     def effects(self, t: ChainTables) -> list[Macro]:
-
-        number = t.number
         low, high = t.plays.limits.drive[0]
         return [
             ("FINE_MIN", operand(low), "ends of the drive range at the output of the drive side"),
             ("FINE_MAX", operand(high), ""),
-            ("LEAST_CODE", operand(number.least_code[0]), "limits of a drive before the drive range applies"),
-            ("MOST_CODE", operand(number.most_code[0]), ""),
-            ("DRIVE_BITS", f"{number.drive_bits[0]}u", "bits of a signal of the drive side below a drive code"),
-            ("ARRIVING_BITS", f"{number.arriving_bits[0]}u", "and below an input of the plays"),
-            ("LEVEL_BITS", f"{number.level_bits[0]}u", "bits of a signal of the output side below an output code"),
-            ("LEVEL_DROP", f"{number.level_drop[0]}u", "and further bits of a sum of the plays"),
-            ("LARGEST_LEVEL", operand(number.largest_level[0]), "largest sum of the plays to solve for"),
-            ("SHARE_BITS", f"{number.share_bits[0]}u", "bits of a mantissa below a code"),
-            ("BRAKED_DROP", f"{number.braked_drop[0]}u", "bits of a signal beyond those of a search for a lead"),
         ]
 
     def code_sizes(self, t: ChainTables) -> list[Macro]:
@@ -197,20 +187,15 @@ class FixedForm(Form):
         return int(t.number.drive_bits[0])
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
-        return writer.lines("factor_t", own, [f"    {entries(row, 'f')}," for row in rows], len(rows))
+        return writer.lines("factor_t", own, [f"    {{{entries(row)}}}," for row in rows], len(rows))
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [
             Field("place_t", "here"),
             Field("signal_t", "next", "output, along the move, at which another play begins to follow"),
             Field("kink_t", "kink", "of the present step; kept here rather than on the stack"),
-            Field("corner_t", "corner", "", max(plays, 1)),
+            Field("corner_t", "corner", length=str(max(plays, 1))),
         ]
-
-
-def _factor(pair: Iterable[int]) -> str:
-    """A factor without its braces."""
-    return entries(pair, "f")[1:-1]
 
 
 def _errors(options: Options, bounds: tuple[float, float | None, float | None], condition: str = "") -> Errors:
@@ -356,9 +341,8 @@ def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:
     """A stage of saturation behind the plays."""
     behind, own = t.behind, f"behind_{j + 1}"
     if behind.kind[j] == slots.DEAD_ZONE:
-        lower, upper, *over = behind.piece[j]
-        row = f"    {literal(lower)}, {literal(upper)}, {entries(over, 'ff')},"
-        return EmittedStage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")
+        row = members(type(behind.stops), behind.stops[j])
+        return EmittedStage("stops", (writer.block("stops_t", own, row),), f"&hystgen_{own}")
     curves = [
         _pieces(behind.bends, which, f"{own}_{direction}", writer)
         for which, direction in ((2 * j, "there"), (2 * j + 1, "back"))

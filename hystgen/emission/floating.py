@@ -15,7 +15,6 @@ from hystgen.emission.compensator import (
     ConstantTable,
     EmittedStage,
     Errors,
-    Field,
     Form,
     Numbers,
     Tabled,
@@ -24,9 +23,11 @@ from hystgen.emission.compensator import (
     entries,
     filled,
     macros,
+    macros_of,
     pointers,
 )
 from hystgen.emission.options import Options
+from hystgen.emission.runtime import Field
 from hystgen.emission.text import Number, literal, operand
 from hystgen.front.stage import StageTables
 from hystgen.plays import slots
@@ -103,19 +104,6 @@ class FloatingForm(Form):
                 ("LATE", operand(plays.first[1]), "share of its stretch that a play gains by the end of a step"),
                 ("KEPT", operand(plays.second[1]), "and on the way to the next step"),
             ]
-        numbers = (
-            ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
-            ("CENTRE", moving.MIDDLE, "of the loops with another weight"),
-            ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
-            ("AMPLITUDE", moving.AMPLITUDE, "share of more weight at the centre"),
-            ("STEEPEST", moving.STEEPEST, "change of a contribution there"),
-            ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
-            ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
-            ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
-            ("RATE", moving.RATE, "reciprocal of the sum's mean slope"),
-            ("CLOSE", moving.CLOSE, "distance of the sum at which a search ends"),
-            ("STANDING_SHARE", moving.SEEN, "share of a step after which the input is taken as standing still"),
-        )
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
         arrays = [
             writer.array("real_t", name, list(row))
@@ -128,7 +116,7 @@ class FloatingForm(Form):
             if wanted:
                 arrays.append(writer.rows("real_t", name, map(entries, rows), *rows.shape))
         return arrays, [
-            *((name, operand(plays.number[place]), comment) for name, place, comment in numbers),
+            *macros_of(plays.number),
             ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
             ("NEWTON_TRIES", f"{moving.NEWTON_TRIES}u", "tries of a search by Newton's method"),
             ("HALVES", f"{plays.halves}u", "and by halving after them"),
@@ -141,7 +129,7 @@ class FloatingForm(Form):
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         undo = [Field("place_t", "undo", "place of the plays before the solution")] * inverse
-        return [Field("plays_t", "plays"), *undo, Field("corner_t", "corner", "", plays + 1)]
+        return [Field("plays_t", "plays"), *undo, Field("corner_t", "corner", length=str(plays + 1))]
 
 
 def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, float, float]) -> Errors:

@@ -99,12 +99,13 @@ def front(one: EmittedModel) -> str:
 def composed(one: EmittedModel) -> Code:
     """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
     family, names, operators = one.family, one.names, one.options.operators
-    own_types: list[runtime.Piece] = []
+    blocks: list[runtime.Piece] = []
     own_functions: list[runtime.Piece] = []
     if one.compiled:
-        from hystgen.emission import own
+        from hystgen.emission import declarations, own
 
         own_types, own_functions = own.pieces(one.compiled.tables)
+        blocks = [*declarations.pieces(family.kind), *own_types]
     pieces = runtime.operator_pieces(one.variant, operators, front(one), one.calls, own_functions)
     called = sorted(runtime.used(pieces))
     shared = one.options.layout == "shared-runtime"
@@ -119,7 +120,7 @@ def composed(one: EmittedModel) -> Code:
     tables: list[runtime.Piece] = []
     if one.glue:
         glue = one.glue.named({op: runtime.fields(pieces, op) for op in operators})
-        types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
+        types = [*blocks, *glue.states.values()]
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         kinds = [f"hystgen_{kind}" for kind, _ in contents]
         tables = [piece for piece in runtime.needed(types, [*called, *kinds]) if piece not in states]

@@ -249,7 +249,7 @@ def _declared(kind: BlockKind) -> Iterator[tuple[str, str]]:
     """Names of a block's types and functions, and their declarations."""
     name = f"hystgen_{kind.name}"
     for own_type, struct in ((f"{name}_table_t", kind.table), (f"{name}_t", kind.state)):
-        members = " ".join(f"hystgen_{word} {each};" for each, (word, _) in struct.members().items())
+        members = " ".join(f"hystgen_{word} {each};" for each, (word, *_) in struct.members().items())
         yield own_type, f"typedef struct {{ {members} }} {own_type};"
     for verb in VERBS:
         memory = "" if verb == "resting" else f"{name}_t *self, "

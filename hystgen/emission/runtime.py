@@ -12,7 +12,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -36,8 +36,8 @@ FLOAT_KERNELS = (
     "plays/loop_absorb.c",
     "plays/loop_solve.c",
 )
-CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
-"""The types of effects."""
+CHAIN_TYPES = "compensator/chain/types.h"
+"""The types of effects, for an editor; emission writes them from their declarations."""
 CORNER_STATE = "compensator/corners/state.h"
 """The types of both instances in engine corners without effects."""
 HELPERS = ("arithmetic/factors.c", "effects/gains.c")
@@ -315,7 +315,8 @@ class Variant:
         elif not self.bends:
             plays = (solve, *files(f"{self.moves} alone"), refined)
         else:
-            moved = (*files("bends"), *files(self.moves))
+            tried = (f"{chain}attempt.h",) * (self.family.kind == "float")
+            moved = (*tried, *files("bends"), *files(self.moves))
             plays = (*moved, f"{chain}moving_plays.c", f"{chain}moving_search.c", refined)
         brake = files("brake") if self.braked else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)
@@ -358,23 +359,40 @@ def template(template: str, /, **values: object) -> str:
     return environment().get_template(template).render(values)
 
 
+LANGUAGE = {
+    "bool": 1, "float": 4, "double": 8, "int64_t": 8, "int32_t": 4, "int16_t": 2, "uint32_t": 4, "uint16_t": 2,
+    "uint8_t": 1, "uint_least16_t": 2, "uint_least8_t": 1, "unsigned int": 0,
+}
+"""Bytes of standard types, which are also their alignments; 0 if they depend on the target."""
+
+
 @dataclass(frozen=True)
-class Member:
-    """A member of a structure: its type without prefix, its array lengths, and its width as a bit field, or 0."""
+class Field:
+    """A member of a structure. Its type is one of the run time's, without prefix, a standard one or a pointer; an array
+    has a `length` as written in C; `bits`: the width of a bit field."""
 
     kind: str
-    pointer: bool
-    lengths: tuple[str, ...]
-    bits: int
+    name: str
+    comment: str = ""
+    length: str = ""
+    bits: int = 0
+
+    def text(self) -> str:
+        """Its declaration in C, if it is not a bit field."""
+        kind = self.kind if "*" in self.kind else f"{self.kind} " if self.kind in LANGUAGE else f"hystgen_{self.kind} "
+        size = f"[{self.length}]" if self.length else ""
+        return f"{kind}{self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A top-level piece of C with the comment above it."""
+    """A top-level piece of C with the comment above it; `declared`: the members of a structure, if it is written from
+    them."""
 
     name: str
     text: str
     uses: frozenset[str]
+    declared: tuple[Field, ...] = ()
 
     @property
     def code(self) -> str:
@@ -382,16 +400,15 @@ class Piece:
         return _COMMENT.sub("", self.text)
 
     @property
-    def members(self) -> tuple[Member, ...]:
+    def members(self) -> tuple[Field, ...]:
         """The members that it declares, if it is a structure."""
         head, _, body = self.code.partition("{")
-        if "typedef struct" not in head:
-            return ()
-        declared = (_MEMBER.match(" ".join(each.split())) for each in body.rpartition("}")[0].split(";")[:-1])
+        if self.declared or "typedef struct" not in head:
+            return self.declared
+        found = (_MEMBER.match(" ".join(each.split())) for each in body.rpartition("}")[0].split(";")[:-1])
         return tuple(
-            Member(each["kind"], bool(each["pointer"]), tuple(re.findall(r"\[(.+?)\]", each["sizes"])),
-                   int(each["bits"] or 0))
-            for each in declared if each
+            Field(one[1].rstrip().removeprefix("hystgen_"), one[2], "", one[3] or "", int(one[4] or 0))
+            for one in found if one
         )
 
     @property
@@ -402,8 +419,7 @@ class Piece:
 
 
 _MEMBER = re.compile(
-    r"(?:const )?(?:hystgen_)?(?P<kind>unsigned int|\w+) (?P<pointer>\(?\*)?\w+\)?(?P<sizes>(?:\[[^\]]+\])*)"
-    r"(?: : (?P<bits>\d+))?$"
+    r"((?:const )?(?:hystgen_)?(?:unsigned int|\w+)(?: \(?\*)?) ?(\w+)\)?(?:\[([^\]]+)\])?(?: : (\d+))?$"
 )
 _CONSTANT = re.compile(r"^static const (?:hystgen_)?(\w+) \w+((?:\[\d+\])*) = ", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
@@ -436,7 +452,7 @@ def split_pieces(source: str) -> list[Piece]:
         lines.append(line)
         depth += code.count("{") - code.count("}")
         if constant or (not depth and code.rstrip().endswith(("}", ";"))):
-            pieces.append(_piece("\n".join(lines) + "\n"))
+            pieces.append(piece_of("\n".join(lines) + "\n"))
             lines = []
     return pieces
 
@@ -555,7 +571,7 @@ def operator_pieces(
 
     def put(functions: Mapping[str, folding.Function]) -> list[Piece]:
         made = [
-            piece if each is None or each == functions.get(piece.name) else _piece(functions[piece.name].text())
+            piece if each is None or each == functions.get(piece.name) else piece_of(functions[piece.name].text())
             for piece, each in parsed if each is None or piece.name in functions
         ]
         return needed(made, roots)
@@ -572,15 +588,18 @@ def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
     return folding.fields([found for piece in pieces if (found := folding.parsed(piece.text))], operator)
 
 
-def _piece(text: str) -> Piece:
+def declared_type(name: str, comment: str, fields: Iterable[Field]) -> Piece:
+    """A structure in C."""
+    members = tuple(fields)
+    body = "\n".join(f"    {each.text()}" for each in members)
+    return replace(piece_of(f"{comment}\ntypedef struct {{\n{body}\n}} hystgen_{name};\n"), declared=members)
+
+
+def piece_of(text: str) -> Piece:
+    """The piece with this text."""
     code = _COMMENT.sub("", text)
     own = _defined_name(code)
     return Piece(own, text, frozenset(_NAME.findall(code)) - {own})
-
-
-def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
-    """The types of blocks, a user's own last, and then of instances of models with effects."""
-    return [*_pieces(CHAIN_TYPES, family.facts), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
@@ -600,7 +619,7 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
-            made.append(_piece("\n".join(kept)))
+            made.append(piece_of("\n".join(kept)))
     return made
 
 

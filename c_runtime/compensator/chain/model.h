@@ -8,8 +8,8 @@
 #endif
 #include "compensator/model.h"
 #ifdef HYSTGEN_CHAIN
-#include "compensator/chain/tables.h"
-#include "compensator/chain/state.h"
+#include "compensator/chain/attempt.h"
+#include "compensator/chain/types.h"
 #endif
 #ifndef HYSTGEN_CONFIGURED
 

@@ -19,14 +19,14 @@ static inline hystgen_sum_t hystgen_size(hystgen_sum_t x) {
    search is over. */
 HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
     const hystgen_sum_t found = search->found;
-    if (found < search->sum) {
+    if (found < search->total) {
         search->low = search->input;
-        search->short_of = search->sum - found;
+        search->short_of = search->total - found;
     } else {
         search->top = search->input - 1;
-        search->over = found - search->sum;
+        search->over = found - search->total;
     }
-    return hystgen_size(found - search->sum) <= HYSTGEN_NEAR || search->top == search->low;
+    return hystgen_size(found - search->total) <= HYSTGEN_NEAR || search->top == search->low;
 }
 
 /* Updates the rate to that of the secant through the last two inputs, once there are two. */
@@ -44,7 +44,7 @@ HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
 /* The input to which the rate leads from the one tried last: at least 1 further, and in range. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
     const hystgen_sum_t input = search->input;
-    const hystgen_sum_t left = search->sum - search->found;
+    const hystgen_sum_t left = search->total - search->found;
     const hystgen_sum_t room = HYSTGEN_LARGEST_INPUT - (left > 0 ? input : -input);
     const uint64_t size = (uint64_t)hystgen_size(left);
     const uint64_t steps = hystgen_wide((uint32_t)(size >> HYSTGEN_WORD), search->rate) +
@@ -80,7 +80,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     self->search.top = HYSTGEN_LARGEST_INPUT;
     self->search.short_of = 0;
     self->search.over = -1;
-    self->search.sum = hystgen_asked(h);
+    self->search.total = hystgen_asked(h);
     self->search.tries = 0;
     self->search.input = self->play[0];
     self->search.before = self->play[0];
@@ -94,7 +94,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
 #endif
         self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
-    if (hystgen_size(self->search.found - self->search.sum) <= HYSTGEN_NEAR) {
+    if (hystgen_size(self->search.found - self->search.total) <= HYSTGEN_NEAR) {
         return self->search.input;
     }
     return (hystgen_reach_t)self->search.low + (self->search.short_of > self->search.over ? 1 : 0);

@@ -33,7 +33,7 @@ from hystgen.compensator.chain.layout import Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.maps import MapErrors
 from hystgen.effects.part import Gained, Speed
-from hystgen.effects.plays import CLOSE, DASHPOT, DILATED, RELAXING, SEEN
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING
 
 SAME = "both have seen the same drives"
 
@@ -106,11 +106,11 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
         stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
         play = 8.0 * u * size + stretched + mover.disorder(rows, ways[1])  # plays that a sum assumes to be stationary
         if emitted:
-            play += float(t.number[SEEN]) * way  # a slower input counts as standing still
+            play += float(t.number.standing_share[0]) * way  # a slower input counts as standing still
     most = moving.slopes(static, compiled.parts.plays, compiled.seconds)[1]
     missed = most * 3.0 * (high - low) * 2.0**-t.halves
     left = moving.residual(static, compiled.parts.plays, u)
-    return play, summed, most * u * size + (left if missed + summed <= float(t.number[CLOSE]) else max(missed, left))
+    return play, summed, most * u * size + (left if missed + summed <= float(t.number.close[0]) else max(missed, left))
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:

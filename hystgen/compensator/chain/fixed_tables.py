@@ -53,7 +53,7 @@ from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Pa
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects import bend
-from hystgen.effects.maps import MapTables, Wanted
+from hystgen.effects.maps import FixedStops, MapTables, Wanted
 from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.effects.plays import FixedMovingTables
 from hystgen.parameters.schema import Compensation
@@ -392,21 +392,21 @@ class _Builder:
 
     def _maps(self) -> MapTables:
         self.bends: list[list[Bend]] = []
-        kinds, pieces = [], []
+        kinds, stops = [], []
         most, degree = LARGEST // 2, self.about.degree
         for each, size, ends in zip(self.parts.maps, self.sizes.mapped, self.sizes.inverted, strict=True):
             self.bends.append([self._bend(curve) for curve in each.curves(size, ends, float(self.output_lsb))])
             kinds.append(slots.TANH if self.bends[-1] else slots.DEAD_ZONE)
             over = self._need(functools.partial(factor, 1.0 / each.give if each.give else 0.0), "stops")
             limits = [min(max(self.signal(end), -most), most) for end in (each.lower, each.upper)]
-            pieces.append([*limits, *factor(each.give), *over])
+            stops.append((*limits, factor(each.give), over))
         curves = [one for pair in self.bends for one in pair or (None, None)]
         found = bend.bends(
             [one.curve.pieces if one else [] for one in curves],
             [one.curve.domain if one else (0, 0) for one in curves],
             [(one.drop, one.lift) if one else (0, 0) for one in curves], degree,
         )
-        return MapTables(np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found)
+        return MapTables(np.array(kinds, dtype=np.int64), FixedStops.of(stops), found)
 
     def _bend(self, wanted: Wanted) -> Bend:
         """The fitted curve of a map."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import N
-from hystgen.basics.structures import Int64, Real, Struct, UInt8
+from hystgen.basics.structures import Int64, Literal, Real, Struct, UInt8, note
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.noise import Smoothing
@@ -30,30 +30,30 @@ from hystgen.plays.slots import Counts, LimitTable, Reals
 
 
 class ChainNumbers(Struct):
-    """Constants of a chain besides those of its plays and blocks."""
+    """Constants of a chain besides those of its plays and blocks, in C macros."""
 
-    output_offset: Real
-    farthest_offset: Real  # largest offset that can be set in addition
-    slew_rising: Real  # largest rise of the drive in a step; next, largest fall
+    output_offset: Real = note("added to every displacement")
+    farthest_offset: Real = note("largest additional offset that can be set")
+    slew_rising: Real = note("largest move of the drive per step")
     slew_falling: Real
-    slew_rising_rest: Real  # remainders that rounding removed from these two numbers
+    slew_rising_rest: Real = note("and its rounding remainder")
     slew_falling_rest: Real
-    share: Real  # fraction of a deviation that `correct` trims in verification
-    dither: Real  # amplitude of a dithering drive at rest, as a signal in front of the plays
+    share: Literal  # fraction of a deviation that `correct` trims in verification
+    dither: Real = note("signal by which a drive at rest alternates")
 
 
 class FixedChainNumbers(ChainNumbers):
-    """The numbers in fixed point. `.._bits`, `.._drop`: bits of the first quantity below the last bit of the second."""
+    """The same in fixed point."""
 
-    level_bits: UInt8  # a signal behind the plays, an output code
-    level_drop: UInt8  # a sum of the plays, a signal behind them
-    largest_level: Int64  # largest sum asked of the plays
-    least_code: Int64  # smallest and largest code of a drive before limiting
+    level_bits: UInt8 = note("bits of a signal of the output side below an output code")
+    level_drop: UInt8 = note("and further bits of a sum of the plays")
+    largest_level: Int64 = note("largest sum of the plays to solve for")
+    least_code: Int64 = note("limits of a drive before the drive range applies")
     most_code: Int64
-    share_bits: UInt8  # a mantissa, a code
-    drive_bits: UInt8  # a signal in front of the plays, a drive code
-    arriving_bits: UInt8  # a signal in front of the plays, their input
-    braked_drop: UInt8  # a signal in front of the plays, the numbers in the search for the lead of a braked lag
+    share_bits: UInt8 = note("bits of a mantissa below a code")
+    drive_bits: UInt8 = note("bits of a signal of the drive side below a drive code")
+    arriving_bits: UInt8 = note("and below an input of the plays")
+    braked_drop: UInt8 = note("bits of a signal beyond those of a search for a lead")
 
 
 TRAVEL_BITS = 16

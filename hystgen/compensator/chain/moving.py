@@ -244,37 +244,37 @@ def build(
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
     first, second, curve = np.zeros(n + 1), np.zeros(n + 1), np.zeros((n + 1, 1))
     moves, kind, yields = at.PLAIN, at.STRAIGHT, np.zeros((0, 5))
-    number = np.zeros(at.SEEN + 1)
-    number[[at.LEAST_INPUT, at.LARGEST_INPUT, at.HALF, at.ONE]] = 2.0 * low - high, 2.0 * high - low, 0.5, 1.0
+    number = {"least_input": 2.0 * low - high, "largest_input": 2.0 * high - low, "half": 0.5, "one": 1.0}
     varies = None
     for mover in movers(static, effects):
         found = mover.numbers(seconds, largest_step, 3.0 * (high - low))
-        moves, first[1:], second[1:], yields, number[at.SEEN], _ = found
+        moves, first[1:], second[1:], yields, number["standing_share"], _ = found
         varies = found.varies if moves == at.DASHPOT else None
     for effect in effects:
         if effect.bends_plays():
             kind, rows, numbers, _ = BENDS.of(effect, r, p)
             curve = np.zeros((n + 1, rows.shape[1]))
             curve[1:] = rows
-            number[list(numbers)] = list(numbers.values())
+            number |= numbers
     halves = int(np.finfo(dtype).nmant) + 4
     alone = not movers(static, effects) and not any(effect.bends_plays() for effect in effects)
     turns = 0
     if not alone:
         unit = float(np.finfo(dtype).eps) / 2
         ends = slopes(static, effects, seconds)
-        number[at.RATE], turns = inverse_turns(*ends, unit)
-        number[at.CLOSE] = closeness(static, effects, ends, unit, turns, varies)
-        if (room := number[at.CLOSE] - sum_rounding(static, effects, unit)) > 0.0:  # a narrower interval is not needed
+        number["rate"], turns = inverse_turns(*ends, unit)
+        number["close"] = closeness(static, effects, ends, unit, turns, varies)
+        if (room := number["close"] - sum_rounding(static, effects, unit)) > 0.0:  # a narrower interval is not needed
             halves = min(halves, math.ceil(math.log2(3.0 * (high - low) * ends[1] / room)))
     alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
-    given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
-    first, second, curve, number, share, inverse, yields = given
+    given = (np.array(each, dtype=dtype) for each in (first, second, curve, share, inverse, yields))
+    first, second, curve, share, inverse, yields = given
+    constants = at.MovingNumbers.of([[number.get(name, 0.0) for name in at.MovingNumbers.members()]], dtype)
     return at.MovingTables(
-        moves, kind, first, second, curve, number, halves, turns, int(scanned), share, inverse, yields
+        moves, kind, first, second, curve, constants, halves, turns, int(scanned), share, inverse, yields
     )
 
 
@@ -337,15 +337,14 @@ def build_fixed(
     near = int(0.5 * int(plays.weight[0]) * least / weight) if weight > 0.0 else 0
     stretch_end = min(farthest + bump.end, 2**32 - 1)
     bits = min(MOST_YIELD_BITS, 61 - stretch_end.bit_length())
-    rows: list[tuple[int, ...]] = []
+    rows: list[tuple[object, ...]] = []
     for mover in movers(static, effects):
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
     return at.FixedMovingTables(
         own.moves, own.bends, own.scanned, first, second, farthest, near, max(32, 31 + near.bit_length()), relaxed,
-        curves, np.array(bump.of, dtype=np.int64), bump.bits,
-        np.array(rows, dtype=np.int64).reshape(-1, 7), bits, stretch_end,
-        np.array(factor(float(own.number[at.SEEN])), dtype=np.int64),
+        curves, np.array(bump.of, dtype=np.int64), bump.bits, at.FixedYield.of(rows), bits, stretch_end,
+        np.array(factor(float(own.number.standing_share[0])), dtype=np.int64),
     )
 
 
@@ -354,7 +353,7 @@ def yield_error(
 ) -> float:
     """As `Mover.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch lost to rounding."""
     rows, held = [], []
-    for begin, *c, shift, lift in t.yields.tolist():
+    for begin, c, shift, lift in t.yields.tolist():
         unit, run = step * 2.0 ** (lift - t.yield_bits), step * 2.0 ** (31 - shift)
         rows.append((begin * step, *(each * unit / run**k for k, each in enumerate(c))))
         held.append(2.5 * unit)  # rounding of a coefficient and of three products

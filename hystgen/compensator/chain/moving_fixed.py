@@ -62,11 +62,11 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
                 return high if short > over else low
             way = size(w - before)
             if tries < SECANTS and way > 0:
-                s.bent[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
+                s.search.rate[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
             before = w
             last = total
             if tries < SECANTS:
-                w = input_after(m, w, left, s.bent[0])
+                w = input_after(m, w, left, s.search.rate[0])
             if w <= low or w >= high:  # outside the interval, or the end that was just tried
                 w = low + (high - low) // 2
             tries += 1
@@ -88,9 +88,9 @@ def asked(t: FixedChainTables, h: int) -> int:
 
 
 @jit(inline=True)
-def begin(_: Reals) -> int:
-    """The rate with which the first search begins: the largest."""
-    return FASTEST
+def begin(s: ChainState, _: Reals) -> None:
+    """Set the rate with which the first search begins: the largest."""
+    s.search.rate[0] = FASTEST
 
 
 @jit(inline=True)

@@ -22,18 +22,18 @@ def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> A
         """Input of the plays at which their sum is h: by Newton's method, from the input extrapolated with the slope of
         the last search, within the interval that remains, then by bisection."""
         number, m = t.moving.number, t.moving
-        low: Scalar = number[at.LEAST_INPUT]
-        high: Scalar = number[at.LARGEST_INPUT]
-        w: Scalar = s.plays.play[0] + (h - s.plays.step.level[0]) * inverse(t, s.bent[0])
+        low: Scalar = number.least_input[0]
+        high: Scalar = number.largest_input[0]
+        w: Scalar = s.plays.play[0] + (h - s.plays.step.level[0]) * inverse(t, s.search.slope[0])
         k = 1
         while True:
             if not (w > low and w < high):  # outside the interval, or the end that was just tried
-                w = low + (high - low) * number[at.HALF]
+                w = low + (high - low) * number.half[0]
             total, slope, steady = sum_at(t, s, w)
             left = h - total
-            if (left <= number[at.CLOSE] and left >= -number[at.CLOSE]) or k == at.NEWTON_TRIES + m.halves:
-                s.bent[0] = steady
-                return w + left * (inverse(t, slope) if m.moves == at.DASHPOT else number[at.RATE])
+            if (left <= number.close[0] and left >= -number.close[0]) or k == at.NEWTON_TRIES + m.halves:
+                s.search.slope[0] = steady
+                return w + left * (inverse(t, slope) if m.moves == at.DASHPOT else number.rate[0])
             if left > zero(left):
                 low = w
             else:
@@ -47,7 +47,7 @@ def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> A
 @jit
 def inverse(t: FloatChainTables, slope: Scalar) -> Scalar:
     """1/slope, without division."""
-    rate: Scalar = t.moving.number[at.RATE]
+    rate: Scalar = t.moving.number.rate[0]
     for _ in range(t.moving.turns):
         rate = rate + rate - slope * rate * rate
     return rate
@@ -60,9 +60,9 @@ def same(t: FloatChainTables, x: Scalar) -> Scalar:  # noqa: ARG001  as in fixed
 
 
 @jit(inline=True)
-def begin(p: Reals) -> Scalar:
-    """The slope with which the first search begins: that without any play following."""
-    return p[0]
+def begin(s: ChainState, p: Reals) -> None:
+    """Set the slope with which the first search begins: that without any play following."""
+    s.search.slope[0] = p[0]
 
 
 @jit(inline=True)

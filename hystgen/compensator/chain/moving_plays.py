@@ -22,7 +22,7 @@ class Kind(NamedTuple):
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
     search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
-    begin: Function  # of weights: the slope or rate with which the first search begins
+    begin: Function  # of state and weights: sets the slope or rate with which the first search begins
     ordered: Function  # of moving tables: whether a sum assumes that plays behind the first stationary one are too
 
 
@@ -102,17 +102,17 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
                 values[i] = bent(m, plays, i, rest)
 
     @jit
-    def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Scalar) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum. `values[0]` is set to the slope, or in
-        fixed point the rate, with which a search begins."""
+    def moved_rest(t: ChainTables, s: ChainState, w: Scalar) -> Any:
+        """Bring the plays to rest with their input at w. Returns their sum."""
+        m, plays, play = t.moving, t.plays, s.plays.play
         r, p = plays.threshold, plays.weight
         total = p[0] * w
-        values[0] = begin(p)
+        begin(s, p)
         for i in range(1, len(r)):
-            put(m, i, s, lost, resting(r, s, i, w))
-            values[i] = bent(m, plays, i, s.play[i])
-            total = total + p[i] * values[i]
-        s.play[0] = w
+            put(m, i, s.plays, s.lost, resting(r, s.plays, i, w))
+            s.bent[i] = bent(m, plays, i, play[i])
+            total = total + p[i] * s.bent[i]
+        play[0] = w
         return total
 
     searched = search(sum_at, tried_at)
@@ -137,7 +137,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w)
             relax(m, t.plays, s.plays, s.bent)
             return level(t, total)
-        return level(t, moved_rest(m, t.plays, s.plays, s.lost, s.bent, w))
+        return level(t, moved_rest(t, s, w))
 
     @jit
     def started(t: ChainTables, s: ChainState) -> Any:
@@ -145,7 +145,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         m = t.moving
         if m.scanned or (m.moves == PLAIN and m.bends == STRAIGHT):
             return level(t, loop_output(t.plays, s.plays))
-        return level(t, moved_rest(m, t.plays, s.plays, s.lost, s.bent, s.plays.play[0]))
+        return level(t, moved_rest(t, s, s.plays.play[0]))
 
     @jit
     def inverse_input(t: ChainTables, s: ChainState, h: Scalar) -> Any:

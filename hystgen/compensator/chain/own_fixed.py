@@ -31,7 +31,8 @@ Row = tuple[tuple[int, int], int, int]
 
 
 class FixedNumber(Struct):
-    """A factor of a user's own block, and the number of bits that a product drops from its argument and its result."""
+    """A factor of a user's own block, and the low-order bits that a product omits from its argument and from its
+    result."""
 
     factor: Factor
     drop: UInt8

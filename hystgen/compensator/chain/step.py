@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, inside, jit
-from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
+from hystgen.basics.structures import Flag, Play, Reach, Real, Signal, Struct, UInt32, note
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
 from hystgen.compensator.chain.preview import PreviewLine, preview_put, preview_repeat
@@ -20,6 +20,7 @@ from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, t
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.plays import FixedMovingTables, FixedSearchState, SearchState
 from hystgen.plays import loop
 from hystgen.plays.loop import State, loop_output
 from hystgen.plays.slots import (
@@ -47,26 +48,26 @@ AGED = next(k for k, part in enumerate(PARTS) if "travel" in part.calls)
 
 
 class RampState(Struct):
-    """A drive in motion at a limited rate: as sent, and its rounding remainder."""
+    """A rate-limited drive: the value sent, and its rounding remainder."""
 
-    drive: Real
-    rest: Real
+    drive: Reach
+    rest: Play
 
 
 class QuietState(Struct):
     """A drive that stands still while the reference does."""
 
-    arrived: Signal  # in front of the plays
+    arrived: Signal = note("last output of the drive side")
     reference: Signal
-    equal: UInt32  # number of equal references in a row, at most one more than makes the drive stand still
+    equal: UInt32 = note("equal references in a row, at most one more than needed to stand still")
 
 
 class SteadyState(Struct):
     """A lag in front of two branches."""
 
-    way: Signal  # move of the signal to which the lag is led, in this sample,
-    moved: Signal  # and in the previous one
-    rises: Flag  # the lag arrives from below
+    way: Signal = note("move of the lag's target in this sample,")
+    moved: Signal = note("and in the previous one")
+    rises: Flag = note("the lag arrives from below")
 
 
 class OwnState(Struct):
@@ -94,6 +95,7 @@ class ChainState(NamedTuple):
     steady: SteadyState
     corners: Any
     kink: Reals  # (4,), in fixed point: the kink of the solution found by engine corners
+    search: Any  # of the input of plays that an effect moves or bends
 
 
 def new_state(t: ChainTables, inverse: bool) -> ChainState:
@@ -116,6 +118,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         SteadyState.of([(0, 0, 1)], dtype),
         t.plays.new_corners() if corners else (),
         np.zeros(4 * corners, dtype),
+        (FixedSearchState if isinstance(t.moving, FixedMovingTables) else SearchState).zeros(1, dtype),
     )
 
 

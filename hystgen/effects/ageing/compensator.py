@@ -11,16 +11,19 @@ import numpy as np
 
 from hystgen.basics.jit import Action, Answer, Scalar, inside, jit, zero
 from hystgen.basics.structures import (
+    AnyFactor,
     Count,
+    FixedUInt8,
     Flag,
+    FloatSignal,
     FourNarrow,
     Narrow,
-    Real,
     Signal,
     SmallCount,
     Struct,
     firsts,
     memory_of,
+    note,
 )
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
@@ -85,10 +88,11 @@ def steepness(effect: Ageing, travelled: float) -> float:
 
 
 class AgeingPiece(Struct):
-    """A piece of the gain over travel: a cubic in the fraction of its length."""
+    """A piece of the gain over travel: a cubic in the travelled share of its length."""
 
     begin: Signal
-    share: Real  # fraction of the length per unit of travel
+    share: AnyFactor = note("of the travel since `begin` in the piece,")
+    drop: FixedUInt8 = note("without the bits that the product leaves out")
     c: FourNarrow
 
 
@@ -169,32 +173,29 @@ class Aged(One):
 # ---------------------------------------------------------------- ageing.c
 
 
-class AgeingTable(Struct):
+class AgeingTable(GainLimits):
     """Gain over travel up to `last`."""
 
     last: Signal
     n: Count
-    turns: SmallCount  # Newton steps for the reciprocal of a gain that has changed
-
-
-class AgeingNumbers(AgeingTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
+    turns: SmallCount = note("Newton steps for the reciprocal of a gain that has changed")
+    bits: FixedUInt8 = note("of a gain below a code that sets it")
 
 
 class AgeingState(Struct):
-    """A gain."""
+    """A gain that depends on the travel."""
 
-    high: Signal  # travel, in two parts
-    low: Signal
+    high: Signal = note("travel, in fixed point in drive codes;")
+    low: FloatSignal = note("its rounding remainder")
     gain: Narrow
     inverse: Narrow
-    own: Flag  # the gain follows the travel
+    own: Flag = note("the gain depends on the travel")
 
 
 KIND = BlockKind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
 
 
-AgeingTables = RowedTables[AgeingNumbers, AgeingPiece]
+AgeingTables = RowedTables[AgeingTable, AgeingPiece]
 
 
 def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
@@ -208,7 +209,7 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     given = [(at, share, *c) for curve in curves for at, share, c in curve.tolist()]
     piece = about.reals(given, "travels of the ageing")
     return AgeingTables(
-        AgeingNumbers.of([(*row, *n) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
+        AgeingTable.of([(*row, *n) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
         firsts(counts),
         AgeingPiece.of([(at, share, c) for at, share, *c in piece], piece.dtype),
     )

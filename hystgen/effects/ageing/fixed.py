@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit, zero
-from hystgen.basics.structures import Factor, Flag, FourNarrow, Narrow, Signal, Struct, UInt8, firsts
+from hystgen.basics.structures import firsts
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import Aged, AgeingPiece, AgeingTable
-from hystgen.effects.gains import (
-    FIXED,
-    GAIN_BITS,
-    LARGEST_GAIN,
-    LEAST_GAIN,
-    ONE,
-    RECIPROCAL_ERROR,
-    GainLimits,
-    newton_steps,
-)
-from hystgen.effects.kinds import RowedTables, Rows, numbered
+from hystgen.effects.ageing.compensator import Aged, AgeingPiece, AgeingState, AgeingTable, AgeingTables
+from hystgen.effects.gains import FIXED, GAIN_BITS, LARGEST_GAIN, LEAST_GAIN, ONE, RECIPROCAL_ERROR, newton_steps
+from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
 
 SHARE_BITS = 20
@@ -35,43 +26,7 @@ LONGEST = 2**61
 """[drive codes] Largest travel that is counted, 5e8 ranges in q31; beyond it the gain keeps its last value."""
 
 
-class FixedAgeingPiece(Struct):
-    """A piece of the gain over travel: a cubic in the fraction of its length."""
-
-    begin: Signal
-    share: Factor  # position in the piece per travel since `begin`, after `drop`
-    drop: UInt8
-    c: FourNarrow
-
-
-class FixedAgeingTable(AgeingTable):
-    """Gain over travel up to `last`."""
-
-    bits: UInt8  # left shift from a caller's code to a gain
-
-
-class FixedAgeingNumbers(FixedAgeingTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
-
-
-class FixedAgeingState(Struct):
-    """A gain."""
-
-    high: Signal  # travel, drive codes
-    gain: Narrow
-    inverse: Narrow
-    own: Flag  # the gain follows the travel
-
-
-KIND = replace(
-    floating.KIND, table=FixedAgeingTable, state=FixedAgeingState, rows=Rows("piece", FixedAgeingPiece)
-)
-
-
-FixedAgeingTables = RowedTables[FixedAgeingNumbers, FixedAgeingPiece]
-
-
-def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
+def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> AgeingTables:
     """Tables from the pieces of the gain and the Newton steps of each ageing effect, for drive codes of `lsb`.
 
     `bits`: left shift from a caller's code to a gain. Raises OverflowError if a number does not fit.
@@ -90,8 +45,8 @@ def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> Fi
             piece.append((at, share, drop, [round(c * ONE) for c in curve]))
             last = at + round(length)
         block.append((*FIXED.limits, last, len(piece) - before, turns, bits))
-    numbers = FixedAgeingNumbers.of(block)
-    return FixedAgeingTables(numbers, firsts(numbers.n.tolist()), FixedAgeingPiece.of(piece))
+    numbers = AgeingTable.of(block)
+    return AgeingTables(numbers, firsts(numbers.n.tolist()), AgeingPiece.of(piece))
 
 
 @dataclass(frozen=True)
@@ -116,7 +71,7 @@ def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
     return AgeingFormats(one, floating.pieces(one.effect), turns)
 
 
-def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgeingTables:
+def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTables:
     """The tables of several blocks, made by `tables`."""
     rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
@@ -126,7 +81,7 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgei
 
 
 @jit
-def along(t: FixedAgeingTables, k: int, travel: int) -> int:
+def along(t: AgeingTables, k: int, travel: int) -> int:
     """As in floating point."""
     on = (travel - t.row.begin[k]) >> t.row.drop[k]
     share = times(on, t.row.share.mantissa[k], t.row.share.shift[k])
@@ -140,13 +95,13 @@ def part_of(gain: int, share: int) -> int:
 
 
 @jit
-def travel_on(t: FixedAgeingTables, s: FixedAgeingState, j: int, way: int) -> None:
+def travel_on(t: AgeingTables, s: AgeingState, j: int, way: int) -> None:
     """Add the length of a move to the travel."""
     following = s.high[j] + way
     s.high[j] = t.block.last[j] if following > t.block.last[j] else following
 
 
 ARITHMETIC = Realized(
-    floating.verbs(FIXED, FixedAgeingState, along, part_of, travel_on),
-    numbered(KIND, 8, 2), made, formats, kinds=(KIND,),
+    floating.verbs(FIXED, AgeingState, along, part_of, travel_on),
+    numbered(floating.KIND, 8, 2), made, formats, kinds=(floating.KIND,),
 )

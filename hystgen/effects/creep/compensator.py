@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import Scalar, jit, zero
-from hystgen.basics.structures import Count, Real, Struct, added, firsts, memory_of
+from hystgen.basics.structures import Count, Real, Struct, added, firsts, memory_of, note
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, numbered
@@ -124,33 +124,33 @@ def shares(terms: Array) -> Array:
 
 
 class CreepTerm(Struct):
-    """The contribution of a creep state to the next output, for inputs up to now: X += rate (share h - X)."""
+    """Creep state X, the contribution of past inputs to the next output: X += rate (share h - X)."""
 
     rate: Real
     share: Real
 
 
 class CreepTable(Struct):
-    """Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the previous sample."""
+    """Creep after the plays: y = slope h + X_1 + X_2 + ..., with the X of the previous sample."""
 
-    slope: Real  # immediate change of y with h
+    slope: Real = note("immediate change in y with h")
     inverse_slope: Real
-    rest: Real  # y over h at rest
+    rest: Real = note("y over h at rest")
     inverse_rest: Real
     n: Count
 
 
 class CreepTermState(Struct):
-    """A number in two parts, since it grows in steps far below its last bit."""
+    """A number in two parts, since its steps may be far smaller than its last bit."""
 
     high: Real
     low: Real
 
 
 class CreepState(Struct):
-    """A block."""
+    """Creep after the plays."""
 
-    ahead: Real  # output of the next sample for an input of 0
+    ahead: Real = note("output of the next sample for an input of 0")
 
 
 KIND = BlockKind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))

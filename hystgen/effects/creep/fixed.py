@@ -16,7 +16,7 @@ import numpy as np
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit, zero
-from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, firsts, memory_of
+from hystgen.basics.structures import Count, Factor, Signal, Struct, UInt8, firsts, memory_of, note
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.kinds import BlockKind, RowedMemory, RowedTables, Rows, numbered
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
@@ -24,37 +24,37 @@ from hystgen.plays.fixed import nearest
 
 
 class FixedCreepTerm(Struct):
-    """A state of creep: its contribution to the next output approaches weight times the input, by the fraction `rate`
-    of the distance per step."""
+    """A state of creep: its contribution at the next sample approaches weight times the input by a share `rate` in each
+    step."""
 
     rate: Factor
-    late: Factor  # fraction of a change of the input that acts at once
+    late: Factor = note("share of an input change that takes effect at once")
     weight: Factor
-    lift: UInt8  # bits of a state that the product with `late` drops
+    lift: UInt8 = note("bits of a state that the product with `late` leaves out")
 
 
 class FixedCreepTable(Struct):
-    """Creep behind the plays: y = d h + X_1 + X_2 + ..."""
+    """Creep after the plays: y = d h + X_1 + X_2 + ..."""
 
-    direct: Factor  # d
-    inverse_slope: Factor  # 1 / (immediate change of y with h)
-    inverse_rest: Factor  # h over y at rest
-    bits: UInt8  # fraction bits of the states beyond a signal's,
-    drop: UInt8  # and bits that products drop
+    direct: Factor = note("d")
+    inverse_slope: Factor = note("1 / (immediate change in y with h)")
+    inverse_rest: Factor = note("h over y at rest")
+    bits: UInt8 = note("bits of the states below those of a signal,")
+    drop: UInt8 = note("and bits that products leave out")
     n: Count
 
 
 class FixedCreepTermState(Struct):
-    """A state."""
+    """A state of creep."""
 
-    next: Int64  # at the next sample for an unchanged input
+    next: Signal = note("at the next sample for an unchanged input")
 
 
 class FixedCreepState(Struct):
-    """A block."""
+    """Creep after the plays."""
 
-    before: Int64  # input of the last sample
-    ahead: Int64  # output of the next sample for the same input
+    before: Signal = note("input of the last sample")
+    ahead: Signal = note("output of the next one for the same input")
 
 
 KIND = BlockKind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from hystgen.basics.jit import Action, Answer, Scalar, inside, jit, zero
-from hystgen.basics.structures import Real, Struct, memory_of
+from hystgen.basics.structures import Literal, Real, Struct, memory_of, note
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
@@ -18,29 +18,24 @@ CARRY_SAMPLES = 2.0**24
 
 
 class ClockTable(Struct):
-    """Drift over time: its rate, and half the change of the rate per second."""
+    """Drift over time: its rate, and half the change in the rate per second."""
 
-    sample: Real  # duration in s of one sample, and of a block of `carry` samples
+    sample: Real = note("duration in s of one sample, and of `carry` of them")
     block: Real
     carry: Real
     rate: Real
     half_change: Real
     farthest: Real
-
-
-class ClockNumbers(ClockTable):
-    """The same, plus constants that are not in the C table."""
-
-    one: Real
-    most_ahead: Real  # largest number of samples by which references are ahead
+    one: Literal
+    most_ahead: Literal  # largest number of samples by which references are ahead
 
 
 class ClockState(Struct):
     """A clock."""
 
-    high: Real  # samples counted: full blocks of `carry`, and those since
+    high: Real = note("samples counted: multiples of the table's carry, and the rest")
     low: Real
-    lead: Real  # samples by which the next reference is ahead
+    lead: Real = note("samples by which the next reference is ahead")
 
 
 KIND = BlockKind("clock", ClockTable, ClockState, own=())
@@ -54,14 +49,14 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
 
 
 @jit
-def clock_start(t: ClockNumbers, s: ClockState, j: int) -> None:  # noqa: ARG001  block interface
+def clock_start(t: ClockTable, s: ClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the last absorbed drive."""
     s.high[j] = zero(s.high[j])
     s.low[j] = zero(s.low[j])
 
 
 @jit
-def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Scalar, v: Scalar) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: ClockTable, s: ClockState, j: int, before: Scalar, v: Scalar) -> None:  # noqa: ARG001  block interface
     """Advance by one sample."""
     following = s.low[j] + t.one[j]
     if following >= t.carry[j]:
@@ -72,7 +67,7 @@ def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Scalar, v: Scalar
 
 
 @jit
-def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Scalar) -> Scalar:
+def clock_drift(t: ClockTable, s: ClockState, j: int, ahead: Scalar) -> Scalar:
     """The drift `ahead` samples after the present one."""
     time = s.high[j] * t.block[j] + (s.low[j] + ahead) * t.sample[j]
     drift = (t.rate[j] + t.half_change[j] * time) * time
@@ -83,12 +78,12 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
     """The verbs of a clock from its functions in an arithmetic."""
 
     @jit
-    def added(t: ClockNumbers, s: ClockState, j: int) -> Scalar:
+    def added(t: ClockTable, s: ClockState, j: int) -> Scalar:
         """The drift now."""
         return drift(t, s, j, zero(t.one[j]))
 
     @jit
-    def lead(t: ClockNumbers, s: ClockState, j: int, filled: int) -> None:
+    def lead(t: ClockTable, s: ClockState, j: int, filled: int) -> None:
         """Note a new reference: the next one is one sample further ahead, up to the length of the preview."""
         following = t.one[j]
         if filled:
@@ -96,7 +91,7 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
         s.lead[j] = t.most_ahead[j] if following > t.most_ahead[j] else following
 
     @jit
-    def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Scalar:
+    def ahead(t: ClockTable, s: ClockState, j: int, filled: int, moving: int) -> Scalar:
         """The drift at the time of the newest reference."""
         late = s.lead[j] if filled else zero(t.one[j])
         return drift(t, s, j, late + t.one[j] if moving else late)
@@ -104,10 +99,10 @@ def verbs(memory: Callable[..., object], start: Action, tick: Action, drift: Ans
     return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
 
 
-def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> ClockNumbers:
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> ClockTable:
     """The constants of a model's clock."""
     rows = about.reals([numbers(each, about.seconds, about.span, about.ahead) for each in effects], "drift")
-    return ClockNumbers.of(rows, rows.dtype)
+    return ClockTable.of(rows, rows.dtype)
 
 
 ARITHMETIC = Realized(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from hystgen.basics.jit import inside, jit, zero
-from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
+from hystgen.basics.structures import Literal, Signal, Struct, UInt8, memory_of, note
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import BlockKind, numbered
@@ -25,30 +25,25 @@ STATE_BITS = 58
 
 
 class FixedClockTable(Struct):
-    """Drift over time: its change in the first sample, and the growth of this change from sample to sample."""
+    """Drift over time: its change in the first sample, and the growth of this change per sample."""
 
-    slope: Int64
-    change: Int64
-    samples: Int64  # after which the drift stays constant
-    farthest: Int64
-    bits: UInt8  # fraction bits of slope and change beyond a signal's
-
-
-class FixedClockNumbers(FixedClockTable):
-    """The same, plus constants that are not in the C table."""
-
-    one: Int64
-    most_ahead: Int64  # largest number of samples by which references are ahead
+    slope: Signal
+    change: Signal
+    samples: Signal = note("after which the drift is constant")
+    farthest: Signal
+    bits: UInt8 = note("bits of slope and change below those of a signal")
+    one: Literal
+    most_ahead: Literal  # largest number of samples by which references are ahead
 
 
 class FixedClockState(Struct):
     """A clock."""
 
-    whole: Int64  # drift, in units of signals,
-    part: Int64  # and the fraction below, in units of the table
-    lead: Int64  # samples by which the next reference is ahead
-    gained: Int64  # growth of the change per sample since the start
-    count: Int64  # samples since the start
+    whole: Signal = note("drift, in units of signals,")
+    part: Signal = note("and the fraction below, in units of the table")
+    lead: Signal = note("samples by which the next reference is ahead")
+    gained: Signal = note("growth of the change in a sample since the start")
+    count: Signal = note("samples since the start")
 
 
 KIND = BlockKind("clock", FixedClockTable, FixedClockState, own=())
@@ -56,7 +51,7 @@ KIND = BlockKind("clock", FixedClockTable, FixedClockState, own=())
 
 @dataclass(frozen=True)
 class ClockFormats:
-    """The members of `FixedClockNumbers`, and the largest error of the drift in signals."""
+    """The members of `FixedClockTable`, and the largest error of the drift in signals."""
 
     table: tuple[int, ...]
     error: float
@@ -107,7 +102,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
 
 
 @jit
-def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # noqa: ARG001  block interface
+def clock_start(t: FixedClockTable, s: FixedClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the last absorbed drive."""
     s.whole[j] = zero(s.whole[j])
     s.part[j] = s.whole[j]
@@ -116,7 +111,7 @@ def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # no
 
 
 @jit
-def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: int, v: int) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: FixedClockTable, s: FixedClockState, j: int, before: int, v: int) -> None:  # noqa: ARG001  block interface
     """Advance by one sample."""
     if s.count[j] >= t.samples[j]:
         return
@@ -129,7 +124,7 @@ def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: int, v:
 
 
 @jit
-def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) -> int:
+def clock_drift(t: FixedClockTable, s: FixedClockState, j: int, ahead: int) -> int:
     """The drift `ahead` samples after the present one."""
     more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
     drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])
@@ -143,5 +138,5 @@ def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: flo
 
 ARITHMETIC = Realized(
     floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), numbered(KIND, 3),
-    lambda clocks, _: FixedClockNumbers.of([one.table for one in clocks]), formats, kinds=(KIND,),
+    lambda clocks, _: FixedClockTable.of([one.table for one in clocks]), formats, kinds=(KIND,),
 )

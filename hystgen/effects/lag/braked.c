@@ -83,6 +83,14 @@ static hystgen_narrow_t hystgen_braked_cut(hystgen_narrow_t over, hystgen_narrow
 /* Largest number in the search for a lead: the square of a sum of two fits 64 bits. */
 #define HYSTGEN_BRAKED_MOST (((int32_t)1 << 30) - 1)
 
+/* Numbers of the search for a lead, with fewer bits than signals. */
+typedef struct {
+    int32_t left; /* distance that the lag is to gain beyond its target's move */
+    int32_t back; /* decrease in the lead per step */
+    int32_t lead; /* lead before a cut */
+    int32_t room; /* largest cut in the lead */
+} hystgen_brake_t;
+
 /* A signal as a number of the search, which has fewer bits. */
 static int32_t hystgen_braked_coarse(int64_t x) {
     const int64_t coarse = x >> HYSTGEN_BRAKED_DROP;

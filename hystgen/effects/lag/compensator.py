@@ -6,13 +6,24 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.jit import N, Scalar, inside, jit, zero
-from hystgen.basics.structures import Real, Struct, added, memory_of
+from hystgen.basics.structures import (
+    AnyFactor,
+    FixedSignal,
+    FixedUInt8,
+    FloatReal,
+    FloatSignal,
+    Signal,
+    Struct,
+    added,
+    memory_of,
+    note,
+)
 from hystgen.effects.base import Block, Place, decays
 from hystgen.effects.kinds import BlockKind, Constants
 from hystgen.effects.lag.model import Lag
@@ -158,74 +169,74 @@ than 2e-5 of the distance and never overshoots, as the tests of overshoot check.
 
 
 class LagTable(Struct):
-    """A lag that is led."""
+    """Lag before the plays: x += rate (v - x); the output lies theta of that step behind x."""
 
-    rate: Real
-    theta: Real
-    late: Real
-    inverse_rate: Real
+    rate: AnyFactor
+    theta: AnyFactor
+    late: FloatReal
+    inverse_rate: AnyFactor
+    bits: FixedUInt8 = note("bits of the states below those of a signal,")
+    drop: FixedUInt8 = note("and bits that products leave out")
 
 
 class ExactTable(Struct):
-    """A lag that is inverted exactly."""
+    """Lag shorter than half a step: a += early v_before + late v - rate a. In fixed point the output follows a share
+    `late` of a move at once, and approaches the input by a share `rate` in the next step."""
 
-    rate: Real
-    early: Real
-    late: Real
-    inverse_late: Real
+    rate: AnyFactor
+    early: FloatReal
+    late: AnyFactor
+    inverse_late: AnyFactor
+    bits: FixedUInt8 = note("bits of the state below those of a signal,")
+    drop: FixedUInt8 = note("and bits that products leave out")
 
 
 class LagState(Struct):
     """A lag that is led."""
 
-    high: Real  # x, the response to a held drive, in two parts
-    low: Real
-    wanted: Real  # output to which the last input leads
-    asked: Real  # requested output,
-    answer: Real  # and the input that was to lead there
+    high: Signal = note("x, the response to a zero-order-hold drive;")
+    low: FloatSignal = note("its rounding remainder")
+    wanted: Signal = note("output for the last input")
+    asked: Signal = note("requested output,")
+    answer: FloatSignal = note("and the input solved for it")
+    lead: FixedSignal = note("and the move of x solved for it")
 
 
 class BrakedState(LagState):
     """A lag behind a slew limit."""
 
-    earlier: Real  # `asked` one sample earlier
+    earlier: Signal = note("output requested one sample before")
 
 
 class ExactState(Struct):
     """A lag that is inverted exactly."""
 
-    reached: Real
-    before: Real  # input of the last sample
+    reached: FloatSignal
+    next: FixedSignal = note("output at the next sample for an unchanged input")
+    before: Signal = note("input of the last sample")
 
 
 KIND = BlockKind("lag", LagTable, LagState, own=("rest", "solve", "absorb"))
 BRAKED_KIND = replace(KIND, name="braked", state=BrakedState, like=KIND.name)
-EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState, reading=("solve", "absorb"))
+EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState)
+KINDS = KIND, EXACT_KIND, BRAKED_KIND
 
 
-L = TypeVar("L", bound=Struct)
-X = TypeVar("X", bound=Struct)
-
-
-class EitherTables(NamedTuple, Generic[L, X]):
+class LagTables(NamedTuple):
     """All lags of a model: `exact` (k,), 1 for a lag that is inverted exactly, with its constants in `inverted` (k,),
     else in `led` (k,); `braked`: 1 if the only lag is kept from overshooting behind a slew limit."""
 
     exact: Counts
-    led: L
-    inverted: X
+    led: LagTable
+    inverted: ExactTable
     braked: int
 
 
-class EitherMemory(NamedTuple, Generic[L, X]):
+class LagMemory(NamedTuple):
     """Memory of all lags: of each lag both as a led lag and as one that is inverted exactly."""
 
-    led: L
-    inverted: X
-
-
-LagTables = EitherTables[LagTable, ExactTable]
-LagMemory = EitherMemory[BrakedState, ExactState]
+    led: BrakedState
+    inverted: ExactState
 
 
 def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray[Any]], braked: int = 0) -> LagTables:
@@ -237,11 +248,11 @@ def tables(lags: Sequence[LagNumbers], reals: Callable[[ArrayLike, str], NDArray
     )
 
 
-def constants(t: LagTables) -> Iterator[Constants]:
-    """The constants of each lag."""
+def constants(t: LagTables, if_exact: tuple[int, int] = (3, 3), led: tuple[int, int] = (3, 2)) -> Iterator[Constants]:
+    """The constants of each lag, with its products in absorb and solve if it is inverted exactly or led."""
     kind = BRAKED_KIND if t.braked else KIND
-    for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
-        yield Constants(EXACT_KIND, inverted, (3, 3)) if exact else Constants(kind, led, (3, 2))
+    for exact, one, inverted in zip(t.exact, t.led, t.inverted, strict=True):
+        yield Constants(EXACT_KIND, inverted, if_exact) if exact else Constants(kind, one, led)
 
 
 @jit
@@ -410,7 +421,7 @@ def steady_state(s: LagMemory) -> Scalar:
 LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
 ARITHMETIC = Realized(
     Verbs(memory_of(LagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
-    lambda blocks, about: tables(blocks, about.reals, about.braked), kinds=(KIND, EXACT_KIND, BRAKED_KIND),
+    lambda blocks, about: tables(blocks, about.reals, about.braked), kinds=KINDS,
 )
 
 # ---------------------------------------------------------------- at steps of any length

@@ -33,7 +33,9 @@ HYSTGEN_APART int64_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *
 }
 #else
 /* Settles everything at the input v. Returns the output. */
-static hystgen_real_t hystgen_lag_exact_rest(hystgen_lag_exact_t *self, hystgen_real_t v) {
+static hystgen_real_t hystgen_lag_exact_rest(const hystgen_lag_exact_table_t *t,
+                                             hystgen_lag_exact_t *self, hystgen_real_t v) {
+    (void)t; /* read in fixed point */
     self->reached = v;
     self->before = v;
     return v;

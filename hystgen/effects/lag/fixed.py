@@ -6,9 +6,10 @@ another input, the target falls short by `1 - theta` times the difference betwee
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,15 +17,16 @@ import numpy as np
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import inside, jit, zero
-from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
-from hystgen.effects.kinds import Constants
+from hystgen.basics.structures import AnyFactor, memory_of
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import (
     HALVES,
-    EitherMemory,
-    EitherTables,
+    ExactTable,
+    LagMemory,
     LagNumbers,
     LagSizes,
+    LagTable,
+    LagTables,
     shifted,
     steady_led,
 )
@@ -33,64 +35,6 @@ from hystgen.plays.fixed import nearest
 
 EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which rounding cannot stall."""
-
-
-class FixedLagTable(Struct):
-    """A lag that is led."""
-
-    rate: Factor
-    theta: Factor
-    inverse_rate: Factor
-    bits: UInt8  # fraction bits of the states beyond a signal's,
-    drop: UInt8  # and bits that products drop
-
-
-class FixedExactTable(Struct):
-    """A lag that is inverted exactly."""
-
-    rate: Factor
-    late: Factor
-    inverse_late: Factor
-    bits: UInt8  # fraction bits of the states beyond a signal's,
-    drop: UInt8  # and bits that products drop
-
-
-class FixedLagState(Struct):
-    """A lag that is led."""
-
-    high: Int64  # x, the response to a held drive
-    wanted: Int64  # output to which the last input leads
-    asked: Int64  # requested output,
-    lead: Int64  # and the move that is to lead there
-
-
-class FixedBrakedState(FixedLagState):
-    """A lag behind a slew limit."""
-
-    earlier: Int64  # `asked` one sample earlier
-
-
-class FixedExactState(Struct):
-    """A lag that is inverted exactly."""
-
-    next: Int64  # output at the next sample for an unchanged input
-    before: Int64  # input of the last sample
-
-
-KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState)
-BRAKED_KIND = replace(KIND, name="braked", state=FixedBrakedState, like=KIND.name)
-EXACT_KIND = replace(KIND, name="lag_exact", table=FixedExactTable, state=FixedExactState)
-
-
-FixedLagTables = EitherTables[FixedLagTable, FixedExactTable]
-FixedLagMemory = EitherMemory[FixedBrakedState, FixedExactState]
-
-
-def constants(t: FixedLagTables) -> Iterator[Constants]:
-    """The constants of each lag."""
-    kind = BRAKED_KIND if t.braked else KIND
-    for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
-        yield Constants(EXACT_KIND, inverted, (8, 4)) if exact else Constants(kind, led, (8, 4))
 
 
 @dataclass(frozen=True)
@@ -150,7 +94,7 @@ def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: floa
     return LagFormats(one, sizes, bits, drop)
 
 
-def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTables:
+def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> LagTables:
     """All lags of a model."""
     rows = []
     for each in blocks:
@@ -158,7 +102,7 @@ def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTa
         middle = one.late * 2.0**bits if one.exact else one.second * 2.0**drop
         rows.append((*map(factor, (one.rate * 2.0**drop, middle, one.inverse * 2.0 ** (drop - bits))), bits, drop))
     exact = np.array([int(each.one.exact) for each in blocks], dtype=np.int64)
-    return FixedLagTables(exact, FixedLagTable.of(rows), FixedExactTable.of(rows), about.braked)
+    return LagTables(exact, LagTable.of(rows), ExactTable.of(rows), about.braked)
 
 
 # ---------------------------------------------------------------- lag.c, exact.c
@@ -168,13 +112,13 @@ COARSE = 2**30 - 1
 
 
 @jit
-def scaled(t: FixedLagTable | FixedExactTable, j: int, x: int, by: Factor) -> int:
+def scaled(t: LagTable | ExactTable, j: int, x: int, by: AnyFactor) -> int:
     """A number in a state's units times a factor of lag j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
+def lag_rest(t: LagTables, s: LagMemory, j: int, x: int) -> int:
     """Settle everything at the input x. Returns the output."""
     if t.exact[j]:
         s.inverted.next[j] = x << t.inverted.bits[j]
@@ -190,7 +134,7 @@ def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
 
 
 @jit
-def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
+def lag_solve(t: LagTables, s: LagMemory, j: int, y: int) -> int:
     """The input that leads to the output y at this sample."""
     if t.exact[j]:
         left = (y << t.inverted.bits[j]) - s.inverted.next[j]
@@ -202,7 +146,7 @@ def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: int) -> int:
 
 
 @jit
-def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
+def lag_absorb(t: LagTables, s: LagMemory, j: int, x: int) -> int:
     """Absorb the input x at this sample. Returns the output."""
     if t.exact[j]:
         late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
@@ -224,7 +168,7 @@ def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: int) -> int:
 
 
 @jit
-def steady_missed(t: FixedLagTables, way: int) -> int:
+def steady_missed(t: LagTables, way: int) -> int:
     """How far a model's only lag falls short of a move in its first sample."""
     bits = t.led.bits[0]
     return nearest(scaled(t.led, 0, way << bits, t.led.theta), bits)
@@ -232,7 +176,7 @@ def steady_missed(t: FixedLagTables, way: int) -> int:
 
 @jit
 def steady_solve(
-    t: FixedLagTables, s: FixedLagMemory, y: int, moved: int, rises: int, applied: int, little: int
+    t: LagTables, s: LagMemory, y: int, moved: int, rises: int, applied: int, little: int
 ) -> tuple[int, int]:
     """As in floating point; a kept input has no move."""
     bits = t.led.bits[0]
@@ -249,7 +193,7 @@ def steady_solve(
 
 
 @jit
-def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: int, rises: int, applied: int, little: int) -> int:
+def steady_kept(t: LagTables, s: LagMemory, v: int, rises: int, applied: int, little: int) -> int:
     """As in floating point; `little` is at least a drive code, so that rounding to a code leaves the drive ahead."""
     bits = t.led.bits[0]
     x = nearest(s.led.high[0], bits)
@@ -264,7 +208,7 @@ def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: int, rises: int, applie
 
 
 @jit
-def steady_absorb(s: FixedLagMemory, before: int) -> None:
+def steady_absorb(s: LagMemory, before: int) -> None:
     """Note that the lag has moved; sums are exact, so no remainder can take it back."""
 
 
@@ -273,7 +217,7 @@ def steady_absorb(s: FixedLagMemory, before: int) -> None:
 
 @jit
 def braked(
-    t: FixedLagTables, s: FixedLagMemory, near: int, short: int, falling: int, rising: int, code: int, drop: int
+    t: LagTables, s: LagMemory, near: int, short: int, falling: int, rising: int, code: int, drop: int
 ) -> int:
     """As in floating point; `code`: a drive code; all arguments are signals; the search drops `drop` bits."""
     bits = t.led.bits[0]
@@ -293,7 +237,7 @@ def braked(
 
 
 @jit
-def braked_over(t: FixedLagTables, size: int, lead: int, back: int, room: int, drop: int) -> int:
+def braked_over(t: LagTables, size: int, lead: int, back: int, room: int, drop: int) -> int:
     """As in floating point, in the coarse numbers of the search."""
     margin = back >> 1
     most = coarsely(t, size, drop) if size <= margin else size
@@ -326,13 +270,14 @@ def coarse(x: int, drop: int) -> int:
 
 
 @jit
-def coarsely(t: FixedLagTables, x: int, drop: int) -> int:
+def coarsely(t: LagTables, x: int, drop: int) -> int:
     """`x/(1 - E)` in coarse numbers."""
     return coarse(scaled(t.led, 0, x << (t.led.bits[0] + drop), t.led.inverse_rate), drop)
 
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, coarse=COARSE)
 ARITHMETIC = Realized(
-    Verbs(memory_of(FixedLagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
-    tables, formats, kinds=(KIND, EXACT_KIND, BRAKED_KIND),
+    Verbs(memory_of(LagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED),
+    functools.partial(floating.constants, if_exact=(8, 4), led=(8, 4)),
+    tables, formats, kinds=floating.KINDS,
 )

@@ -38,7 +38,7 @@ def _polynomials(effect: PlayFunctions, scale: float) -> Bent:
 
         return rows[i - 1], polynomial
 
-    return Bent(at.POLYNOMIAL, curve, {at.SCALE: scale, at.INVERSE_SCALE: 1.0 / scale}, bump)
+    return Bent(at.POLYNOMIAL, curve, {"scale": scale, "inverse_scale": 1.0 / scale}, bump)
 
 
 def _centred(effect: LoopCentre) -> Bent:
@@ -46,9 +46,9 @@ def _centred(effect: LoopCentre) -> Bent:
     envelope = TanhEnvelope((1.0, inverse, -effect.centre * inverse, 0.0))
     begin = float(envelope.forward(0.0))
     numbers = {
-        at.MIDDLE: effect.centre, at.INVERSE_WIDTH: inverse, at.BUMP: high,
-        at.AMPLITUDE: effect.amplitude, at.STEEPEST: 1.0 + effect.amplitude,
-        at.TANH_CENTRE: math.tanh(effect.centre / effect.width),
+        "centre": effect.centre, "inverse_width": inverse, "bump": high,
+        "amplitude": effect.amplitude, "steepest": 1.0 + effect.amplitude,
+        "tanh_centre": math.tanh(effect.centre / effect.width),
     }
     return Bent(
         at.CENTRE, np.zeros((1, 1)), numbers, lambda _: (None, lambda z: high * (float(envelope.forward(z)) - begin))
@@ -62,19 +62,19 @@ def _centred(effect: LoopCentre) -> Bent:
 def steep(t: MovingTables, plays: Any, i: int, z: Any) -> tuple[Any, Any]:
     """Contribution of play i at z, and its change per change of z."""
     if t.bends == at.POLYNOMIAL:
-        x = z * t.number[at.INVERSE_SCALE]
+        x = z * t.number.inverse_scale[0]
         total = z - z
         slope = total
         for k in range(t.curve.shape[1] - 1, -1, -1):
             total = total + t.curve[i, k]
             slope = slope * x + total
             total = total * x
-        return z + t.number[at.SCALE] * (total * x), t.number[at.ONE] + (slope * x + total)
+        return z + t.number.scale[0] * (total * x), t.number.one[0] + (slope * x + total)
     if t.bends == at.CENTRE:
-        bump = tanh((z - t.number[at.MIDDLE]) * t.number[at.INVERSE_WIDTH], plays.tanh)
-        value = z + t.number[at.BUMP] * (bump + t.number[at.TANH_CENTRE])
-        return value, t.number[at.STEEPEST] - t.number[at.AMPLITUDE] * bump * bump
-    return z, t.number[at.ONE]
+        bump = tanh((z - t.number.centre[0]) * t.number.inverse_width[0], plays.tanh)
+        value = z + t.number.bump[0] * (bump + t.number.tanh_centre[0])
+        return value, t.number.steepest[0] - t.number.amplitude[0] * bump * bump
+    return z, t.number.one[0]
 
 
 @jit

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit, zero
 from hystgen.effects.base import Array, Effect, decays
 from hystgen.effects.part import Function, late
-from hystgen.effects.plays import DASHPOT, DILATED, ONE, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, Moved, Moves, MovingTables, PlaysPart, Response
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals
@@ -106,11 +106,11 @@ class Movement:
 
     def whole_yields(
         self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
-    ) -> list[tuple[int, ...]]:
+    ) -> list[tuple[object, ...]]:
         """`FixedMovingTables.yields` for stretches up to `end` steps, with knots at `begins` among others."""
         if not (dashpot := self.dashpot):
             return []
-        found: list[tuple[int, ...]] = late("rate_dependence", "whole_yields")()(
+        found: list[tuple[object, ...]] = late("rate_dependence", "whole_yields")()(
             lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits
         )
         return found
@@ -394,7 +394,7 @@ def yields(t: MovingTables, x: Any) -> Any:
 @jit(inline=True)
 def seen(t: MovingTables, way: Any) -> Any:
     """The part of `way` at which the input counts as standing still."""
-    return way * t.number[SEEN]
+    return way * t.number.standing_share[0]
 
 
 @jit(inline=True)
@@ -452,14 +452,14 @@ def tried(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, moving: bool
     """Whether play i moves when the input of the plays goes to w, or comes to rest there; the value it reaches, and its
     change per further change of w."""
     q, x = s.play[i], s.play[0]
-    one = t.number[ONE]
+    one = t.number.one[0]
     if t.moves == DASHPOT and moving:
         x = x + seen(t, w - x) - q
         on = (-x if x < zero(x) else x) - r[i]
         if not on > zero(on):
             return False, q, one
         gained, slope = yielding(t, on)
-        return True, q + (lost[i] - gained if x < zero(x) else lost[i] + gained), slope * t.number[SEEN]
+        return True, q + (lost[i] - gained if x < zero(x) else lost[i] + gained), slope * t.number.standing_share[0]
     if t.moves == RELAXING:
         on = stretch(w - q, r[i])
         share = t.first[i] if moving else one

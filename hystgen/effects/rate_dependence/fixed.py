@@ -15,21 +15,19 @@ from hystgen.plays.fixed import FixedPlayTables, loop_solve, nearest
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals
 
-YIELD_BEGIN, YIELD_C0, YIELD_C1, YIELD_C2, YIELD_C3, YIELD_SCALE, YIELD_LIFT = range(7)
-"""Columns of the yields of a nonlinear dashpot in fixed point, as in `hystgen_yield_t`."""
-
 
 def whole_yields(
     law: Callable[[float], tuple[float, float]], begins: Sequence[int], end: int, step: float, bits: int
-) -> list[tuple[int, ...]]:
-    """Pieces of the yields of stretches up to `end`, cubic between integer knots; the first one is straight."""
+) -> list[tuple[object, ...]]:
+    """The members of a `FixedYield` for each piece of the yields of stretches up to `end`, cubic between integer knots;
+    the first piece is straight."""
     knots = sorted({0, end + 1, *(x for x in begins if 0 < x <= end)})
     while knots[-2] and LONGEST * knots[-2] < end:  # beyond the last piece in floating point
         knots.insert(-1, int(LONGEST) * knots[-2])
     while (wide := max(b - a for a, b in itertools.pairwise(knots))) > 2**30:
         k = next(i for i, (a, b) in enumerate(itertools.pairwise(knots)) if b - a == wide)
         knots.insert(k + 1, (knots[k] + knots[k + 1]) // 2)
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for a, b in itertools.pairwise(knots):
         shift = 31 - (b - a).bit_length()
         ratio = 2.0 ** (31 - shift) / (b - a)  # range of the variable per length of the piece
@@ -41,7 +39,7 @@ def whole_yields(
             c = [0.0, law(b * step)[0], 0.0, 0.0]
         units = [each * ratio**k * 2.0**bits / step for k, each in enumerate(c)]
         lift = max(0, max(math.frexp(each)[1] for each in units) - 30)
-        rows.append((a, *(round(each / 2.0**lift) for each in units), shift, lift))
+        rows.append((a, [round(each / 2.0**lift) for each in units], shift, lift))
     return rows
 
 
@@ -56,15 +54,15 @@ def yields(t: FixedMovingTables, x: int) -> int:
     high = len(t.yields)
     while high - low > 1:
         middle = (low + high) // 2
-        if inside < t.yields[middle, YIELD_BEGIN]:
+        if inside < t.yields.begin[middle]:
             high = middle
         else:
             low = middle
-    h = (inside - t.yields[low, YIELD_BEGIN]) << t.yields[low, YIELD_SCALE]
+    h = (inside - t.yields.begin[low]) << t.yields.scale[low]
     y = h - h
-    for k in range(YIELD_C3, YIELD_BEGIN, -1):
-        y = t.yields[low, k] + ((y * h + HALF) >> 31)
-    y = y << t.yields[low, YIELD_LIFT]
+    for k in range(3, -1, -1):
+        y = t.yields.c[low, k] + ((y * h + HALF) >> 31)
+    y = y << t.yields.lift[low]
     most = x << t.yield_bits
     return most if y > most else y
 

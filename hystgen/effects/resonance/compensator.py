@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hystgen.basics.jit import Scalar, jit, zero
-from hystgen.basics.structures import Real, Signal, Struct, memory_of
+from hystgen.basics.structures import AnyFactor, FixedFactor, FixedUInt8, FloatReal, Signal, Struct, memory_of, note
 from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import BlockKind, numbered
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
@@ -93,22 +93,27 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
 
 
 class ModeTable(Struct):
-    """In a step, a mode's two states, output minus input and the rate of this difference, change in proportion to
-    themselves (keep, swing), to each other (turn), and to a change of the input (lead, push)."""
+    """Mode of the stage. Its two states are output minus input, and the rate of this difference; in a step they change
+    by shares of themselves (keep, swing), of each other (turn), and of a change in the input (lead, in fixed point late
+    minus the change itself, and push)."""
 
-    keep: Real
-    turn: Real
-    swing: Real
-    lead: Real
-    push: Real
+    keep: AnyFactor
+    turn: AnyFactor
+    swing: AnyFactor
+    lead: FloatReal
+    late: FixedFactor
+    push: AnyFactor
+    bits: FixedUInt8 = note("bits of the states below those of a signal,")
+    drop: FixedUInt8 = note("bits that products with states leave out,")
+    lift: FixedUInt8 = note("and bits that products with a change in the input leave out")
 
 
 class ModeState(Struct):
-    """A mode."""
+    """A mode of the stage."""
 
-    before: Signal  # input of the last sample
-    off: Signal  # output minus input
-    rate: Signal  # of `off`, per radian of the mode
+    before: Signal = note("input of the last sample")
+    off: Signal = note("output minus input")
+    rate: Signal = note("of `off`, per radian of the mode")
 
 
 KIND = BlockKind("mode", ModeTable, ModeState, reading=("absorb",), own=("rest", "absorb"))

@@ -7,36 +7,20 @@ below the sample rate this part is a small factor, with 31 bits of its own.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Factor, Struct, UInt8, memory_of
+from hystgen.basics.structures import AnyFactor, memory_of
 from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
-from hystgen.effects.resonance.compensator import ModeNumbers, ModeState
+from hystgen.effects.resonance.compensator import ModeNumbers, ModeState, ModeTable
 from hystgen.plays.fixed import nearest
 
 Row = tuple[tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], int, int, int]
-"""The members of a `FixedModeTable`."""
-
-
-class FixedModeTable(Struct):
-    """As in floating point; a change of the input adds `late - 1` of it to `off` and `push` of it to `rate`."""
-
-    keep: Factor
-    turn: Factor
-    swing: Factor
-    late: Factor
-    push: Factor
-    bits: UInt8  # fraction bits of the states beyond a signal's,
-    drop: UInt8  # bits that products with states drop,
-    lift: UInt8  # and bits that products with a change of the input drop
-
-
-KIND = replace(compensator.KIND, table=FixedModeTable)
+"""The members of a `ModeTable`."""
 
 
 def largest_state(one: ModeNumbers, size: float) -> float:
@@ -96,19 +80,19 @@ mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 
 @jit
-def scaled(t: FixedModeTable, j: int, x: int, by: Factor) -> int:
+def scaled(t: ModeTable, j: int, x: int, by: AnyFactor) -> int:
     """A number in a state's units times a factor of mode j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
+def entered(t: ModeTable, j: int, change: int, by: AnyFactor) -> int:
     """A change of the input times a factor of mode j, in a state's units."""
     return times(change, by.mantissa[j], by.shift[j]) << t.lift[j]
 
 
 @jit
-def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
+def mode_absorb(t: ModeTable, s: ModeState, j: int, x: int) -> int:
     """Absorb the input x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
@@ -121,8 +105,8 @@ def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(KIND, 12),
-    lambda modes, _: FixedModeTable.of([each.row for each in modes]),
+    Verbs(memory_of(ModeState), mode_rest, mode_absorb), numbered(compensator.KIND, 12),
+    lambda modes, _: ModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
-    kinds=(KIND,),
+    kinds=(compensator.KIND,),
 )

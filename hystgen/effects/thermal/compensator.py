@@ -5,12 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.basics.jit import Answer, N, Scalar, inside, jit, zero
-from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, added, firsts, memory_of
+from hystgen.basics.structures import (
+    AnyFactor,
+    Count,
+    FixedUInt8,
+    Flag,
+    FloatSignal,
+    Literal,
+    Narrow,
+    Signal,
+    Struct,
+    added,
+    firsts,
+    memory_of,
+    note,
+)
 from hystgen.effects.base import Place
 from hystgen.effects.gains import (
     FLOATING,
@@ -23,7 +37,7 @@ from hystgen.effects.gains import (
     newton_steps,
     too_fast,
 )
-from hystgen.effects.kinds import B, BlockKind, Constants, Rows, numbered
+from hystgen.effects.kinds import BlockKind, Constants, Rows, numbered
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
@@ -44,18 +58,15 @@ from hystgen.plays.slots import Counts
 # ---------------------------------------------------------------- gain.c
 
 
-class GainTable(Struct):
+class GainTable(GainLimits):
     """Gain and offset per degree above the reference, between two temperatures."""
 
-    per_degree: Real
-    offset_per_degree: Real
-    reference: Real
-    coldest: Real
-    hottest: Real
-
-
-class GainNumbers(GainTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
+    per_degree: AnyFactor
+    offset_per_degree: AnyFactor
+    reference: Signal
+    coldest: Signal
+    hottest: Signal
+    bits: FixedUInt8 = note("of a temperature below a code")
 
 
 class GainState(Struct):
@@ -99,12 +110,12 @@ class Warm(One):
         return (asked + margin.span) / LEAST_GAIN
 
 
-def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
+def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainTable:
     """The tables of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     given = [(*FLOATING.limits, *numbers(each, about.span)) for each in effects]
     rows = about.reals(given, "temperatures")
-    return GainNumbers.of(rows, rows.dtype)
+    return GainTable.of(rows, rows.dtype)
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, float, float]:
@@ -131,14 +142,14 @@ def gain_verbs(by: Gains) -> Verbs:
     times, reciprocal, scaled, given = by.times, by.reciprocal, by.scaled, by.given
 
     @jit
-    def reset(t: GainNumbers, s: GainState, j: int) -> None:
+    def reset(t: GainTable, s: GainState, j: int) -> None:
         """Return to the state of the parameter file: gain 1, offset 0."""
         s.gain[j] = t.one[j]
         s.inverse[j] = t.one[j]
         s.offset[j] = zero(t.one[j])
 
     @jit
-    def heat(t: GainNumbers, s: GainState, j: int, temperature: Scalar) -> bool:
+    def heat(t: GainTable, s: GainState, j: int, temperature: Scalar) -> bool:
         """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
         asked = given(t, j, temperature)
         taken = inside(asked, t.coldest[j], t.hottest[j])
@@ -150,12 +161,12 @@ def gain_verbs(by: Gains) -> Verbs:
         return bool(s.gain[j] != wanted or taken != asked)
 
     @jit(inline=True)
-    def solve(t: GainNumbers, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
+    def solve(t: GainTable, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
         """The input that gives the output y."""
         return times(y - s.offset[j], s.inverse[j])
 
     @jit(inline=True)
-    def absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
+    def absorb(t: GainTable, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
         """The output for the input x."""
         return times(x, s.gain[j]) + s.offset[j]
 
@@ -165,68 +176,65 @@ def gain_verbs(by: Gains) -> Verbs:
 # ---------------------------------------------------------------- heat.c
 
 
-class HeatTable(Struct):
-    """Own heat: degrees per amount of heat, and the fraction lost per step."""
+class HeatTable(GainLimits):
+    """Self-heating: degrees gained per amount of heating, the share lost in a step, and the rise up to which gain and
+    offset follow."""
 
-    rate: Real
-    per_amount: Real
-    per_degree: Real
-    offset_per_degree: Real
-    hottest: Real  # temperature rise up to which gain and offset follow
-    turns: Count  # Newton steps for the reciprocal of a gain that has changed
-
-
-class HeatNumbers(HeatTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
+    rate: AnyFactor
+    per_amount: AnyFactor
+    per_degree: AnyFactor
+    offset_per_degree: AnyFactor
+    hottest: Signal
+    turns: Count = note("Newton steps for the reciprocal of a gain that has changed")
+    coarse: FixedUInt8 = note("bits of an amount that its product leaves out,")
+    lift: FixedUInt8 = note("bits of the temperature that the same product leaves out,")
+    drop: FixedUInt8 = note("and bits that products of the temperature leave out")
 
 
 class HeatState(Struct):
-    """A block."""
+    """Self-heating."""
 
-    high: Real  # rise of the temperature, in two parts
-    low: Real
-    gain: Real
-    inverse: Real
-    offset: Real
+    high: Signal = note("rise of the temperature over the surroundings;")
+    low: FloatSignal = note("its rounding remainder")
+    gain: Narrow
+    inverse: Narrow
+    offset: Signal
 
 
 HEAT_KIND = BlockKind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
 
 
 class FrictionPlay(Struct):
-    """A play that rubs."""
+    """A friction play."""
 
     threshold: Signal
 
 
 class FrictionTable(Struct):
-    """Rubbing plays, smallest threshold first."""
+    """Friction plays, the smallest threshold first."""
 
     n: Count
-
-
-class FrictionNumbers(FrictionTable):
-    """The same, plus constants that are not in the C table."""
-
-    one: Signal
-    two: Signal
+    one: Literal
+    two: Literal
+    bits: FixedUInt8 = note("of a play below a drive code")
 
 
 class FrictionPlayState(Struct):
-    """A play that rubs."""
+    """A friction play."""
 
-    at: Narrow
+    at: Narrow = note("value of the play")
 
 
 class FrictionState(Struct):
-    """Plays that rub."""
+    """Friction plays."""
 
-    begun: Flag  # the plays have positions
+    begun: Flag = note("the plays have values")
 
 
 FRICTION_KIND = BlockKind(
     "friction", FrictionTable, FrictionState, Rows("play", FrictionPlay, FrictionPlayState), reading=(), own=()
 )
+HEAT_KINDS = HEAT_KIND, FRICTION_KIND
 
 FRICTION_PLAYS = 16
 """Plays that represent the continuum of rubbing plays: loops heat as with the continuum, to within a thousandth of the
@@ -234,29 +242,22 @@ largest rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rat
 the error in that test, with 16 it is 5.3 times."""
 
 
-F = TypeVar("F", bound=Struct)
-
-
-class RubbingTables(NamedTuple, Generic[B, F]):
+class HeatTables(NamedTuple):
     """Own heat of a model: `block` (k,); `friction` (k,), without plays if the drive's square is the heat; `play` (m,):
     the rubbing plays, those of each block from `first` (k + 1) on."""
 
-    block: B
-    friction: F
+    block: HeatTable
+    friction: FrictionTable
     first: Counts
     play: FrictionPlay
 
 
-class RubbingMemory(NamedTuple, Generic[B]):
+class HeatMemory(NamedTuple):
     """Memory of all blocks: `block` (k,), and of the rubbing plays, `friction` (k,) and `play` (m,)."""
 
-    block: B
+    block: HeatState
     friction: FrictionState
     play: FrictionPlayState
-
-
-HeatTables = RubbingTables[HeatNumbers, FrictionNumbers]
-HeatMemory = RubbingMemory[HeatState]
 
 
 def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
@@ -396,8 +397,8 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     rows = about.reals(given, "temperatures")
     play = about.reals([(r,) for each in widths for r in each], "thresholds")
     return HeatTables(
-        HeatNumbers.of([(*row, n) for row, n in zip(rows, turns, strict=True)], rows.dtype),
-        FrictionNumbers.of([(len(each), 1.0, 2.0) for each in widths], rows.dtype),
+        HeatTable.of([(*row, n) for row, n in zip(rows, turns, strict=True)], rows.dtype),
+        FrictionTable.of([(len(each), 1.0, 2.0) for each in widths], rows.dtype),
         firsts(map(len, widths)),
         FrictionPlay.of(play, play.dtype),
     )
@@ -411,7 +412,7 @@ def heat_way(before: N, v: N) -> N:
 
 
 @jit
-def warmed(t: HeatNumbers, s: HeatState, j: int, amount: Scalar) -> Scalar:
+def warmed(t: HeatTable, s: HeatState, j: int, amount: Scalar) -> Scalar:
     """Absorb the heat of a step. Returns the temperature rise."""
     return added(s, j, t.per_amount[j] * amount - t.rate[j] * s.high[j])
 
@@ -458,11 +459,11 @@ def heat_verbs(
 
 # ---------------------------------------------------------------- friction.c
 
-def friction_constants(t: Any, kind: BlockKind = FRICTION_KIND, each: int = 1) -> Iterator[Constants | None]:
+def friction_constants(t: HeatTables, each: int = 1) -> Iterator[Constants | None]:
     """The rubbing plays of each block, with `each` products per play; None if the block has none."""
     for row, first in zip(t.friction, t.first, strict=False):
         n = int(row["n"])
-        yield Constants(kind, row, (each * n, 0), t.play[first : first + n]) if n else None
+        yield Constants(FRICTION_KIND, row, (each * n, 0), t.play[first : first + n]) if n else None
 
 
 def friction_move(entered: Answer) -> Answer:
@@ -542,7 +543,7 @@ ARITHMETIC = Realized(
 )
 HEAT_ARITHMETIC = Realized(
     heat_verbs(FLOATING, memory_of(HeatMemory), warmed, FLOATING.given, FLOATING.given),
-    numbered(HEAT_KIND, 7, 1), heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
+    numbered(HEAT_KIND, 7, 1), heat_tables, kinds=HEAT_KINDS, beside=friction_constants,
 )
 
 GAIN_PART = ChainPart(

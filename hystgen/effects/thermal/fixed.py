@@ -10,7 +10,7 @@ from typing import Any
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import inside, jit
-from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, firsts, memory_of
+from hystgen.basics.structures import firsts, memory_of
 from hystgen.effects.gains import (
     FIXED,
     GAIN_BITS,
@@ -18,18 +18,19 @@ from hystgen.effects.gains import (
     LEAST_GAIN,
     ONE,
     RECIPROCAL_ERROR,
-    GainLimits,
     newton_steps,
 )
 from hystgen.effects.kinds import numbered
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
-    FrictionNumbers,
     FrictionPlay,
     FrictionTable,
-    RubbingMemory,
-    RubbingTables,
+    GainTable,
+    HeatMemory,
+    HeatState,
+    HeatTable,
+    HeatTables,
     Warm,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
@@ -49,25 +50,7 @@ Numbers = tuple[float, float, float, float, float]
 """Constants of a block, as in `floating.numbers` and `floating.heat_numbers`."""
 
 
-class FixedGainTable(Struct):
-    """Gain and offset per degree above the reference, between two temperatures."""
-
-    per_degree: Factor
-    offset_per_degree: Factor
-    reference: Int64
-    coldest: Int64
-    hottest: Int64
-    bits: UInt8  # left shift from a caller's code to a temperature
-
-
-class FixedGainNumbers(FixedGainTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
-
-
-KIND = replace(floating.KIND, table=FixedGainTable)
-
-
-def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainNumbers:
+def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> GainTable:
     """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: left shift
     from a code to a temperature; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
     found = []
@@ -76,7 +59,7 @@ def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> 
         rates = factor(per_degree * ONE / whole), factor(offset_per_degree * level / whole)
         limits = (round(min(max(end, -degrees), degrees) * whole) for end in ends)
         found.append((*FIXED.limits, *rates, *limits, bits))
-    return FixedGainNumbers.of(found)
+    return GainTable.of(found)
 
 
 @dataclass(frozen=True)
@@ -108,7 +91,7 @@ def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
     return GainFormats(one, floating.numbers(effect, about.span))
 
 
-def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainNumbers:
+def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> GainTable:
     """The tables of several gains, made by `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
@@ -123,52 +106,6 @@ AMOUNT_BITS = 50
 """Bits of the heat of a step, and of a temperature, in a product."""
 
 
-class FixedHeatTable(Struct):
-    """Own heat: degrees gained per amount of heat, the fraction lost per step, and the temperature rise up to which
-    gain and offset follow."""
-
-    rate: Factor
-    per_amount: Factor
-    per_degree: Factor
-    offset_per_degree: Factor
-    hottest: Int64
-    turns: Count  # Newton steps for the reciprocal of a gain that has changed
-    coarse: UInt8  # bits of an amount that its product drops,
-    lift: UInt8  # bits of the temperature that the same product drops,
-    drop: UInt8  # and bits that products with the temperature drop
-
-
-class FixedHeatNumbers(FixedHeatTable, GainLimits):
-    """The same, plus constants that are not in the C table."""
-
-
-class FixedHeatState(Struct):
-    """A block."""
-
-    high: Int64  # temperature above the surroundings
-    gain: Int32
-    inverse: Int32
-    offset: Int64
-
-
-HEAT_KIND = replace(floating.HEAT_KIND, table=FixedHeatTable, state=FixedHeatState)
-
-
-class FixedFrictionTable(FrictionTable):
-    """Rubbing plays, as in floating point."""
-
-    bits: UInt8  # fraction bits of a play, in drive codes
-
-
-class FixedFrictionNumbers(FixedFrictionTable, FrictionNumbers):
-    """The same, plus constants that are not in the C table."""
-
-
-FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
-
-
-FixedHeatTables = RubbingTables[FixedHeatNumbers, FixedFrictionNumbers]
-FixedHeatMemory = RubbingMemory[FixedHeatState]
 
 
 @dataclass(frozen=True)
@@ -233,18 +170,18 @@ def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     return replace(found, one=one)
 
 
-def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
+def heat_tables(rows: Sequence[Heat]) -> HeatTables:
     """The tables of several blocks."""
-    return FixedHeatTables(
-        FixedHeatNumbers.of([(*FIXED.limits, *one.table) for one in rows]),
-        FixedFrictionNumbers.of([(len(one.thresholds), 1, 2, one.bits) for one in rows]),
+    return HeatTables(
+        HeatTable.of([(*FIXED.limits, *one.table) for one in rows]),
+        FrictionTable.of([(len(one.thresholds), 1, 2, one.bits) for one in rows]),
         firsts(len(one.thresholds) for one in rows),
         FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
 
 
 @jit
-def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
+def warmed(t: HeatTable, s: HeatState, j: int, amount: int) -> int:
     """Absorb the heat of a step. Returns the temperature rise without its lowest bits."""
     warmer = times(nearest(amount, t.coarse[j]), t.per_amount.mantissa[j], t.per_amount.shift[j]) << t.lift[j]
     lost = times(s.high[j] >> t.drop[j], t.rate.mantissa[j], t.rate.shift[j])
@@ -253,7 +190,7 @@ def warmed(t: FixedHeatNumbers, s: FixedHeatState, j: int, amount: int) -> int:
 
 
 @jit
-def narrowed(t: FixedHeatNumbers, j: int, gain: int) -> int:
+def narrowed(t: HeatTable, j: int, gain: int) -> int:
     """Bring a gain back within limits that rounding may have exceeded."""
     return inside(gain, t.least[j], t.largest[j])
 
@@ -262,11 +199,11 @@ STATE_BITS = 31
 """Bits of a rubbing play, excluding its sign; a drive takes 15 or 31 of them."""
 
 ARITHMETIC = Realized(
-    floating.gain_verbs(FIXED), numbered(KIND, 2, 2), made, formats, kinds=(KIND,),
+    floating.gain_verbs(FIXED), numbered(floating.KIND, 2, 2), made, formats, kinds=(floating.KIND,),
     degrees=lambda t: float(t.reference[0]) / 2.0**TEMPERATURE_BITS,
 )
 HEAT_ARITHMETIC = Realized(
-    floating.heat_verbs(FIXED, memory_of(FixedHeatMemory), warmed, narrowed, FIXED.given),
-    numbered(HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND),
-    functools.partial(floating.friction_constants, kind=FRICTION_KIND, each=2),
+    floating.heat_verbs(FIXED, memory_of(HeatMemory), warmed, narrowed, FIXED.given),
+    numbered(floating.HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, floating.HEAT_KINDS,
+    functools.partial(floating.friction_constants, each=2),
 )
