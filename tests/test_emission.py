@@ -7,12 +7,15 @@ import functools
 import itertools
 import os
 import re
+import shutil
 import subprocess
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import units
 from elftools.elf.elffile import ELFFile
 from mains import c_main
 from modelfiles import CHAINS, FILES
@@ -22,7 +25,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.names import MAX_NAME
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
-from hystgen.emission import cost, runtime
+from hystgen.emission import cost, declarations, runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.options import read_banner
 from hystgen.emission.text import literal
@@ -636,6 +639,35 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
         assert dict(zip(types, found, strict=True)) == {
             each: str(sizes[each.removeprefix("hystgen_")][0]) for each in types
         }
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(("compiler", "layout"), [
+    ("gcc", cost.Layout(integer=4, pointer=8, packed=False)),
+    ("arm-none-eabi-gcc", cost.CORE_32),
+    ("avr-gcc", cost.AVR),
+])  # fmt: skip
+def test_sizes_of_types_of_effects_are_the_compilers(
+    arithmetic: str, compiler: str, layout: cost.Layout, tmp_path: Path
+) -> None:
+    """The banner computes sizes from declarations; compilers, on the header that is written from them."""
+    if not shutil.which(compiler):
+        pytest.skip(f"{compiler} is not installed")
+    if compiler == "avr-gcc" and arithmetic == "float64":
+        pytest.skip("an AVR has no double")
+    family = replace(runtime.FAMILIES[arithmetic], chain=True)
+    pieces = declarations.pieces(family.kind)
+    sizes = cost.sizes(pieces, family, layout, {})
+    assert len(pieces) > 20
+    checks = [
+        f"_Static_assert(sizeof({piece.name}) == {sizes[piece.name.removeprefix('hystgen_')][0]}, \"{piece.name}\");"
+        for piece in pieces
+    ]
+    source = tmp_path / "sizes.c"
+    source.write_text("\n".join([f'#include "{runtime.CHAIN_TYPES}"', *checks]) + "\n")
+    command = [compiler, "-std=c11", *units.DEFINES[arithmetic], *units.INCLUDES, "-fsyntax-only", source]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
