@@ -179,6 +179,8 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
             return f"{alone.known}; to compensate it anyway, write {write})"
     if effect.name not in CATALOGUE and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
+    if effect.joins_plays():
+        return f"{effect.name} (an element in parallel with the plays)"
     return ""
 
 
