@@ -44,6 +44,38 @@ FASTEST = 2**31 - 1
 """[steps of the input per 2^rate_bits of the sum] Largest rate: the largest whose product with a word fits 63 bits."""
 
 
+class ElementTables(NamedTuple):
+    """Constants of elements (k,) in parallel with the plays, which follow one curve. `piece` (K + 1, 2 + 2 D): where
+    each piece of the curve begins, its value there, and the coefficients of the curve and of its inverse from there on;
+    `weight`, `amplitude`: of z and of z/width; `inverse_width`."""
+
+    piece: Reals
+    weight: Reals
+    amplitude: Reals
+    inverse_width: Reals
+
+
+def no_elements(dtype: Any) -> ElementTables:
+    """The tables of a model without elements."""
+    none = np.zeros(0, dtype)
+    return ElementTables(np.zeros((1, 4), dtype), none, none, none)
+
+
+class ElementMemory(NamedTuple):
+    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); for each, z/width in
+    the direction of the input at that turn in two parts, the place there on the curve, the curve's value there, the
+    distance to the end of the piece, and the coefficients of the curve from there on (k, D)."""
+
+    turned: Reals
+    upward: Counts
+    high: Reals
+    low: Reals
+    place: Reals
+    level: Reals
+    until: Reals
+    local: Reals
+
+
 class MovingTables(NamedTuple):
     """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
     unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
@@ -61,11 +93,12 @@ class MovingTables(NamedTuple):
     share: Reals  # p_i b1 (n + 1,), if scanned
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
     yields: Reals  # (K, 5): yields of a nonlinear dashpot, by pieces
+    elements: ElementTables
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
-        return self.moves != PLAIN or self.bends != STRAIGHT
+        """Whether an effect moves, bends or joins the plays; if not, the loop engine solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT or len(self.elements.weight) > 0
 
 
 class FixedMovingTables(NamedTuple):
@@ -92,11 +125,12 @@ class FixedMovingTables(NamedTuple):
     yield_bits: int
     stretch: int
     seen: Reals
+    elements: ElementTables
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
-        return self.moves != PLAIN or self.bends != STRAIGHT
+        """Whether an effect moves, bends or joins the plays; if not, the loop engine solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT or len(self.elements.weight) > 0
 
 
 class Moved(NamedTuple):
@@ -145,6 +179,14 @@ class Mover(Protocol):
     def disorder(self, rows: Array, top: float) -> float: ...
 
 
+class ElementsInDouble(Protocol):
+    """Elements in double precision: brought to rest at an input, their sum if the input moved there, and that move."""
+
+    def rest(self, w: float) -> None: ...
+    def total(self, w: float) -> float: ...
+    def move(self, w: float) -> None: ...
+
+
 class Bent(NamedTuple):
     """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`; `bump`
     of play i > 0: a key that plays with the same bend share, and its contribution minus the play itself."""
@@ -191,3 +233,42 @@ class PlaysPart(Generic[T, F]):
     of: Callable[..., T]
     floating: F
     coded: Callable[[], F]
+
+
+def element_memory(t: ElementTables) -> ElementMemory:
+    """Memory for the elements of these tables; `Elements.unload` sets it."""
+    dtype, k, degree = t.piece.dtype, len(t.weight), (t.piece.shape[1] - 2) // 2
+    high, low, place, level, until = (np.zeros(k, dtype) for _ in range(5))
+    return ElementMemory(
+        np.zeros(1, dtype), np.ones(1, np.int64), high, low, place, level, until, np.zeros((k, degree), dtype)
+    )
+
+
+class Parallel(NamedTuple):
+    """Elements (k,) in parallel with the plays: weights, largest |z|, largest change of z per change of the input;
+    `memory`: the elements in double precision; `tables`: their constants in a data type."""
+
+    weights: Array
+    widths: Array
+    steepest: Array
+    memory: ElementsInDouble
+    tables: Callable[[Any], ElementTables]
+
+
+class Elements(NamedTuple):
+    """The functions of elements in one arithmetic, of tables, memory and the input: `joined`: their sum, and in
+    floating point its slope; `turn`: turns them there; `unload`: brings them to rest there."""
+
+    joined: Function
+    turn: Function
+    unload: Function
+
+
+@dataclass(frozen=True)
+class ElementsPart:
+    """An effect in parallel with the plays: `of` describes it, from the effect and the span of its input; `floating`:
+    its functions; `coded` loads them in fixed point."""
+
+    of: Callable[..., Parallel]
+    floating: Elements
+    coded: Callable[[], Elements]

@@ -246,6 +246,11 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
         ] * t.bent,
+        *[
+            Field("play_t", "turned", "input of the elements in parallel with the plays at their last turn"),
+            Field("bool", "upward", "their input has risen since"),
+            Field("element_t", "element", "", t.elements),
+        ] * bool(t.elements),
         *[Field("search_t", "search", "for the input of the plays")] * (inverse and bool(t.bends)),
     ]
 

@@ -124,9 +124,14 @@ class FloatingForm(Form):
         for name, rows, wanted in (
             ("yields", plays.yields, plays.moves == moving.DASHPOT),
             ("curve", plays.curve, plays.bends == moving.POLYNOMIAL),
+            ("piece", plays.elements.piece, len(plays.elements.weight) > 0),
         ):
             if wanted:
                 arrays.append(writer.rows("real_t", name, map(entries, rows), *rows.shape))
+        if len(plays.elements.weight):
+            of_elements = (("weight", plays.elements.weight), ("amplitude", plays.elements.amplitude),
+                           ("inverse_width", plays.elements.inverse_width))
+            arrays += [writer.array("real_t", f"element_{name}", list(row)) for name, row in of_elements]
         return arrays, [
             *((name, operand(plays.number[place]), comment) for name, place, comment in numbers),
             ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
@@ -134,6 +139,8 @@ class FloatingForm(Form):
             ("HALVES", f"{plays.halves}u", "and by halving after them"),
             ("TURNS", f"{plays.turns}u", "steps to the reciprocal of a slope"),
             ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
+            ("ELEMENTS", f"{len(plays.elements.weight)}u", "in parallel with the plays"),
+            ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
         ]
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:

@@ -8,6 +8,65 @@
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
 
+#ifdef HYSTGEN_HAS_ELEMENTS
+/* The distance of w from the last turn of the elements, in the direction in which they move. */
+static inline hystgen_play_t hystgen_operator_way(const hystgen_operator_t *self,
+                                                  hystgen_play_t w) {
+    return self->upward ? w - self->turned : self->turned - w;
+}
+
+/* The elements turn at the present input of the plays. */
+HYSTGEN_APART void hystgen_operator_turn(hystgen_operator_t *self) {
+    const hystgen_play_t way = hystgen_operator_way(self, self->play[0]);
+    unsigned int j;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_element_turn(&self->element[j], way * hystgen_element_inverse_width[j]);
+    }
+    self->turned = self->play[0];
+    self->upward = !self->upward;
+}
+
+/* Sum of the elements after their input has moved on to w, in the direction in which they move.
+   Sets its slope. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
+                                                    hystgen_play_t w, hystgen_sum_t *slope) {
+    const hystgen_play_t way = hystgen_operator_way(self, w);
+    hystgen_sum_t sum = 0;
+    hystgen_sum_t steep = 0;
+    unsigned int j;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_sum_t change;
+        const hystgen_sum_t s = hystgen_element_at(
+            &self->element[j], way * hystgen_element_inverse_width[j], &change);
+        sum = sum + hystgen_element_amplitude[j] * s;
+        steep = steep + hystgen_element_weight[j] * change;
+    }
+    *slope = steep;
+    return self->upward ? sum : -sum;
+}
+
+/* The elements follow their input to w, or come to rest there. Returns their sum. */
+static hystgen_sum_t hystgen_operator_elements(hystgen_operator_t *self, hystgen_play_t w) {
+    hystgen_sum_t slope;
+    unsigned int j;
+    if (self->moving) {
+        if (self->upward ? w < self->play[0] : w > self->play[0]) {
+            hystgen_operator_turn(self);
+        }
+        return hystgen_operator_joined(self, w, &slope);
+    }
+    self->turned = w;
+    self->upward = true;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_element_unload(&self->element[j]);
+    }
+    return 0;
+}
+#endif
+
 /* Play i at rest with its input at w. */
 static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
                                       hystgen_play_t w) {
@@ -233,8 +292,14 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t *bent = hystgen_operator_bent(self);
+#ifdef HYSTGEN_HAS_ELEMENTS
+    const hystgen_sum_t beside = hystgen_operator_elements(self, w);
+#endif
     if (self->moving) {
         self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+#ifdef HYSTGEN_HAS_ELEMENTS
+        self->level = self->level + beside;
+#endif
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
 #endif

@@ -149,6 +149,14 @@ static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_
         }
     }
 #endif
+#ifdef HYSTGEN_HAS_ELEMENTS
+    if (self->moving) {
+        hystgen_sum_t more;
+        at->sum = at->sum + hystgen_operator_joined(self, at->input, &more);
+        at->steady = at->steady + more;
+        at->slope = at->slope + more;
+    }
+#endif
 }
 
 /* left/slope. */
@@ -207,6 +215,11 @@ bool hystgen_inverse_solves(hystgen_attempt_t *at, unsigned int k) {
 HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
     hystgen_attempt_t at;
     unsigned int k;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    if (self->moving && (self->upward ? h < self->level : h > self->level)) {
+        hystgen_inverse_turn(self); /* to the side on which the solution lies */
+    }
+#endif
     at.low = HYSTGEN_LEAST_INPUT;
     at.high = HYSTGEN_LARGEST_INPUT;
     at.input = self->play[0];

@@ -155,6 +155,16 @@ typedef struct {
     hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
+/* An element in parallel with the plays, at the last turn of its input. */
+typedef struct {
+    hystgen_real_t high;  /* z/width in the direction of the input, */
+    hystgen_real_t low;   /* and its rounding remainder */
+    hystgen_real_t place; /* on the curve, */
+    hystgen_real_t level; /* the curve's value there, */
+    hystgen_real_t until; /* the distance to the end of its piece, */
+    hystgen_real_t c[7];  /* and its coefficients from there on */
+} hystgen_element_t;
+
 /* An input of the plays that a search has tried. */
 typedef struct {
     hystgen_real_t low; /* the solution lies between these */

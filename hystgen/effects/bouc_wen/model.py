@@ -81,8 +81,8 @@ class _ParallelElements(Effect):
     shown_by: ClassVar[Mapping[str, int]] = {"slow_minor": 1, "slow_reversals": 3, "reversals": 3, "fast_minor": 4}
     order: ClassVar[int] = 2
     timed: ClassVar[bool] = False
-    compensated: ClassVar[Compensated] = "none"
-    compensation: ClassVar[str] = "none: elements in parallel with the plays are not inverted"
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact: one equation per sample is solved"
 
     weights: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
         description="k_j, output per input unit of the plays, of either sign", examples=[[-0.2]]

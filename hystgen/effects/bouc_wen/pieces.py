@@ -1,0 +1,128 @@
+"""The curve of a Bouc-Wen element and its inverse as polynomials, for a compensator."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hystgen.effects.base import Array
+from hystgen.effects.bouc_wen.curve import halves
+from hystgen.effects.bouc_wen.model import place_of, reach
+
+SAMPLES = 33
+"""Points of a piece at which its errors are measured, ends included."""
+
+MOST_PIECES = 2000
+"""Maximum number of pieces, a reserve: float64 takes some 100."""
+
+
+LARGEST = 1e36
+"""Largest coefficient: float32 holds numbers up to 3.4e38."""
+
+
+class Pieces(NamedTuple):
+    """A curve C between places `begin` (K + 1,): on piece k, over h from `begin[k]`, C is `level[k]` (K + 1,) plus
+    `h (up[k, 0] + h (up[k, 1] + ..))`, and the place of the value `level[k] + u` is `begin[k] + u (back[k, 0] + ..)`.
+
+    `error`: largest error of C; `slip`: largest relative error of a change of C, from its slope and from the place at
+    which the inverse puts a value.
+    """
+
+    begin: Array
+    level: Array
+    up: Array
+    back: Array
+    error: float
+    slip: float
+
+
+def steepest(width: float, balance: float, exponent: float, span: float) -> float:
+    """Largest `dz/dw` of an element whose input stays within `span`, after any history from rest.
+
+    The largest s, S, comes after a move over the span from s = -S; then a reversal moves on with `1 + (2 b - 1) S^n`.
+    """
+    above, below = halves(exponent, balance)
+    s = 0.0
+    while True:
+        more = reach(above, below, place_of(above, below, -s) + span / width)
+        if not more > s + 1e-15:
+            return 1.0 + (2.0 * balance - 1.0) * more**exponent
+        s = more
+
+
+@functools.lru_cache(maxsize=16)
+def pieces(exponent: float, balance: float, degree: int, allowed: float) -> Pieces:
+    """The curve as polynomials of a `degree`, from -1 until it is within `allowed` of 1; each errs by at most
+    `allowed`."""
+    above, below = halves(exponent, balance)
+
+    def curve(x: Array) -> Array:
+        return np.array([reach(above, below, each) for each in x.tolist()])
+
+    first, last = place_of(above, below, -1.0), place_of(above, below, 1.0 - allowed)
+    todo = [(0.0, last), (first, 0.0)]
+    begin, up, back, error, slip = [], [], [], 0.0, 0.0
+    while todo:
+        a, b = todo.pop()
+        there, missed, off = _fitted(curve, exponent, balance, degree, a, b)
+        if missed > allowed or off > 64.0 * allowed:
+            if len(begin) + len(todo) > MOST_PIECES:
+                raise OverflowError("the curve bends too sharply")
+            todo += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
+            continue
+        begin.append(a)
+        up.append(there[0])
+        back.append(there[1])
+        error, slip = max(error, missed), max(slip, off)
+    places = np.array([*begin, last])
+    return Pieces(places, curve(places), np.array(up), np.array(back), error + allowed, slip)
+
+
+def _fitted(
+    curve: Callable[[Array], Array], exponent: float, balance: float, degree: int, a: float, b: float
+) -> tuple[tuple[Array, Array], float, float]:
+    """Polynomials of the curve and of its inverse from a to b, the error of C, and that of its slope."""
+    nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(degree + 1) / degree)  # with both ends, so that neighbours meet
+    low, high = curve(np.array([a, b]))
+    x = a + (b - a) * nodes
+    there = _through((b - a) * nodes, curve(x) - low)
+    above, below = halves(exponent, balance)
+    back = _back(functools.partial(place_of, above, below), degree, (a, float(low), float(high)))
+    h = (b - a) * np.linspace(0.0, 1.0, SAMPLES)
+    exact = curve(a + h)
+    missed = float(np.max(np.abs(low + _value(there, h) - exact)))
+    slope = 1.0 - np.where(exact > 0.0, 1.0, 1.0 - 2.0 * balance) * np.abs(exact) ** exponent
+    found = _value(back, exact - low)
+    off = np.abs(found - h) * slope
+    steep = _value(there * np.arange(1, degree + 1) / 1.0, h) / np.where(h > 0.0, h, 1.0)
+    steep[0] = there[0]
+    return (there, back), missed, float(max(np.max(off), np.max(np.abs(steep - slope)) * (b - a)))
+
+
+def _back(place: Callable[[float], float], degree: int, piece: tuple[float, float, float]) -> Array:
+    """Polynomial of the inverse, of the largest degree whose coefficients are no numbers that float32 cannot hold:
+    where the curve is nearly level, they grow with the powers of the reciprocal of its rise."""
+    a, low, high = piece
+    for used in range(degree, 0, -1):
+        values = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * np.arange(used + 1) / used))
+        back = _through(values - low, np.array([place(each) for each in values.tolist()]) - a)
+        if np.max(np.abs(back)) < LARGEST:
+            break
+    return np.append(back, np.zeros(degree - used))
+
+
+def _through(x: Array, y: Array) -> Array:
+    """Coefficients, from x^1 on, of the polynomial through points (degree + 1,) of which the first is (0, 0)."""
+    scale = x[-1]
+    table = (x[1:, None] / scale) ** np.arange(1, len(x))
+    return np.asarray(np.linalg.solve(table, y[1:]) / scale ** np.arange(1, len(x)))
+
+
+def _value(c: Array, x: Array) -> Array:
+    total = np.zeros_like(x)
+    for each in c[::-1]:
+        total = (total + each) * x
+    return total
