@@ -245,14 +245,16 @@ def element_memory(t: ElementTables) -> ElementMemory:
 
 
 class Parallel(NamedTuple):
-    """Elements (k,) in parallel with the plays: weights, largest |z|, largest change of z per change of the input;
-    `memory`: the elements in double precision; `tables`: their constants in a data type."""
+    """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the input;
+    `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the error of
+    their sum in a data type, in the C (True) or of the law in double precision."""
 
     weights: Array
-    widths: Array
+    most: Array
     steepest: Array
     memory: ElementsInDouble
     tables: Callable[[Any], ElementTables]
+    error: Callable[[Any, bool], float]
 
 
 class Elements(NamedTuple):

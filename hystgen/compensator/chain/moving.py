@@ -53,7 +53,7 @@ def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.Parallel
 
 def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
     """Largest magnitude of the sum of the elements in parallel with the plays."""
-    return math.fsum(float(np.abs(each.weights) @ each.widths) for each in parallel(static, effects))
+    return math.fsum(float(np.abs(each.weights) @ each.most) for each in parallel(static, effects))
 
 
 def parallel_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from hystgen.basics.jit import Scalar, jit
 from hystgen.effects.bouc_wen.curve import halves
 from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach
-from hystgen.effects.bouc_wen.pieces import pieces, steepest
+from hystgen.effects.bouc_wen.pieces import Pieces, largest, pieces
 from hystgen.effects.part import late
 from hystgen.effects.plays import ElementMemory, ElementTables, Elements, ElementsPart, Parallel
 
@@ -66,18 +66,37 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> Parallel:
     """What a compensator needs to know of an effect's elements, for inputs within `span`."""
     exponent, balance = effect.law
     weights, widths = np.array(effect.weights), np.array(effect.widths)
-    most = np.array([steepest(width, balance, exponent, span) for width in effect.widths])
+    most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
+    steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
+
+    def polynomials(dtype: Any) -> Pieces:
+        return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
+
+    def error(dtype: Any, emitted: bool) -> float:
+        found, unit = polynomials(dtype), float(np.finfo(dtype).eps) / 2
+        off = (found.error, found.slip) if emitted else (EXACT, EXACT)
+        return float(np.abs(weights) @ widths) * drifted(exponent, off[0] + 8.0 * unit, off[1] + 16.0 * unit)
 
     def tables(dtype: Any) -> ElementTables:
-        unit = float(np.finfo(dtype).eps) / 2
-        found = pieces(exponent, balance, DEGREE, max(FINEST * unit, EXACT))
+        found = polynomials(dtype)
         rows = np.zeros((len(found.begin), 2 + 2 * DEGREE))
         rows[:, 0], rows[:, 1] = found.begin, found.level
         rows[:-1, 2 : 2 + DEGREE], rows[:-1, 2 + DEGREE :] = found.up, found.back
         given = (rows, weights, weights * widths, 1.0 / widths)
         return ElementTables(*(np.array(each, dtype=dtype) for each in given))
 
-    return Parallel(weights, widths, most, Memory(effect), tables)
+    return Parallel(weights, most * widths, steepest, Memory(effect), tables, error)
+
+
+def drifted(exponent: float, error: float, slip: float) -> float:
+    """Bound on the error of s after any number of turns, for errors of C and of its slope.
+
+    Along a move, the difference e of two elements does not grow, as C is concave, except by `slip` per distance moved:
+    2 slip over any single move, since beyond that C has levelled off. Over moves up and down the same distance it
+    shrinks by at least `4 b (e/2)^n` per distance, and grows by up to `2 slip max(1, b)`, so that it stays below
+    `2 slip^(1/n)`, as b >= 1/2. Not proved for moves up and down different distances.
+    """
+    return 2.0 * error + 2.0 * slip + 2.0 * slip ** (1.0 / exponent)
 
 
 # ---------------------------------------------------------------- elements.c

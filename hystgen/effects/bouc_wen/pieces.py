@@ -15,6 +15,12 @@ from hystgen.effects.bouc_wen.model import place_of, reach
 SAMPLES = 33
 """Points of a piece at which its errors are measured, ends included."""
 
+SLIP = 16.0
+"""[errors allowed] Error allowed for the slope of C: what errors of the slope add up to matters more than that of C."""
+
+NOISE = 1e-13
+"""Error of a slope times the piece's length that the rounding of C itself, some 1e-15, causes in a polynomial."""
+
 MOST_PIECES = 2000
 """Maximum number of pieces, a reserve: float64 takes some 100."""
 
@@ -27,8 +33,8 @@ class Pieces(NamedTuple):
     """A curve C between places `begin` (K + 1,): on piece k, over h from `begin[k]`, C is `level[k]` (K + 1,) plus
     `h (up[k, 0] + h (up[k, 1] + ..))`, and the place of the value `level[k] + u` is `begin[k] + u (back[k, 0] + ..)`.
 
-    `error`: largest error of C; `slip`: largest relative error of a change of C, from its slope and from the place at
-    which the inverse puts a value.
+    `error`: largest error of C; `slip`: largest error of its slope, with that of the place at which the inverse puts a
+    value.
     """
 
     begin: Array
@@ -39,17 +45,15 @@ class Pieces(NamedTuple):
     slip: float
 
 
-def steepest(width: float, balance: float, exponent: float, span: float) -> float:
-    """Largest `dz/dw` of an element whose input stays within `span`, after any history from rest.
-
-    The largest s, S, comes after a move over the span from s = -S; then a reversal moves on with `1 + (2 b - 1) S^n`.
-    """
+def largest(width: float, exponent: float, balance: float, span: float) -> float:
+    """Largest s of an element whose input stays within `span`, after any history from rest: S, which comes after a move
+    over the span from s = -S."""
     above, below = halves(exponent, balance)
     s = 0.0
     while True:
         more = reach(above, below, place_of(above, below, -s) + span / width)
         if not more > s + 1e-15:
-            return 1.0 + (2.0 * balance - 1.0) * more**exponent
+            return more
         s = more
 
 
@@ -68,7 +72,7 @@ def pieces(exponent: float, balance: float, degree: int, allowed: float) -> Piec
     while todo:
         a, b = todo.pop()
         there, missed, off = _fitted(curve, exponent, balance, degree, a, b)
-        if missed > allowed or off > 64.0 * allowed:
+        if missed > allowed or off > SLIP * allowed + NOISE / (b - a):
             if len(begin) + len(todo) > MOST_PIECES:
                 raise OverflowError("the curve bends too sharply")
             todo += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
@@ -95,11 +99,10 @@ def _fitted(
     exact = curve(a + h)
     missed = float(np.max(np.abs(low + _value(there, h) - exact)))
     slope = 1.0 - np.where(exact > 0.0, 1.0, 1.0 - 2.0 * balance) * np.abs(exact) ** exponent
-    found = _value(back, exact - low)
-    off = np.abs(found - h) * slope
-    steep = _value(there * np.arange(1, degree + 1) / 1.0, h) / np.where(h > 0.0, h, 1.0)
-    steep[0] = there[0]
-    return (there, back), missed, float(max(np.max(off), np.max(np.abs(steep - slope)) * (b - a)))
+    steep = np.polynomial.polynomial.polyval(h, there * np.arange(1, degree + 1))
+    put = curve(a + _value(back, exact - low))
+    bend = exponent * max(1.0, 2.0 * balance - 1.0)  # largest change of the slope per change of s
+    return (there, back), missed, float(np.max(np.abs(steep - slope)) + bend * np.max(np.abs(put - exact)))
 
 
 def _back(place: Callable[[float], float], degree: int, piece: tuple[float, float, float]) -> Array:
