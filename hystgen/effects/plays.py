@@ -54,11 +54,55 @@ class ElementTables(NamedTuple):
     amplitude: Reals
     inverse_width: Reals
 
+    @classmethod
+    def none(cls, dtype: Any) -> ElementTables:
+        """The tables of a model without elements."""
+        empty = np.zeros(0, dtype)
+        return cls(np.zeros((1, 4), dtype), empty, empty, empty)
 
-def no_elements(dtype: Any) -> ElementTables:
-    """The tables of a model without elements."""
-    none = np.zeros(0, dtype)
-    return ElementTables(np.zeros((1, 4), dtype), none, none, none)
+    def memory(self) -> ElementMemory:
+        """Memory for these elements; `Elements.unload` sets it."""
+        dtype, k, degree = self.piece.dtype, len(self.weight), (self.piece.shape[1] - 2) // 2
+        high, low, place, level, until = (np.zeros(k, dtype) for _ in range(5))
+        return ElementMemory(
+            np.zeros(1, dtype), np.ones(1, np.int64), high, low, place, level, until, np.zeros((k, degree), dtype)
+        )
+
+
+class FixedElementTables(NamedTuple):
+    """The same in fixed point. Of each piece (K + 1,): where it `begin`s and the curve's `level` there, both with 44
+    bits, the right shift `scale` from a distance to its share of the length with 31 bits, coefficients `up` (K + 1, D)
+    of the mean slope, and of the inverse `back` (K + 1, D) over the `share` (K + 1, 2) of the piece's rise, a factor of
+    a value with `lift` more bits. Of each element (k,): a `weight` of 1, the factor `distance` (k, 2) from a move to
+    widths, `far`, the largest move that counts, and the factor `amplitude` (k, 2) from s to the sum, both products with
+    lower bits left out."""
+
+    begin: Reals
+    level: Reals
+    scale: Reals
+    up: Reals
+    back: Reals
+    share: Reals
+    lift: Reals
+    weight: Reals
+    distance: Reals
+    distance_lift: Reals
+    far: Reals
+    amplitude: Reals
+    amplitude_lift: Reals
+
+    @classmethod
+    def none(cls) -> FixedElementTables:
+        """The tables of a model without elements."""
+        one, row, empty, pair = (np.zeros(n, np.int64) for n in (1, (1, 1), 0, (0, 2)))
+        return cls(one, one, one, row, row, row, one, empty, pair, empty, empty, pair, empty)
+
+    def memory(self) -> FixedElementMemory:
+        """Memory for these elements; `Elements.unload` sets it."""
+        k = len(self.weight)
+        s, place, level, until, scale = (np.zeros(k, np.int64) for _ in range(5))
+        local = np.zeros((k, self.up.shape[1]), np.int64)
+        return FixedElementMemory(np.zeros(1, np.int64), np.ones(1, np.int64), s, place, level, until, local, scale)
 
 
 class ElementMemory(NamedTuple):
@@ -74,6 +118,19 @@ class ElementMemory(NamedTuple):
     level: Reals
     until: Reals
     local: Reals
+
+
+class FixedElementMemory(NamedTuple):
+    """The same in fixed point; `s`: z/width in the direction of the input; `scale`: as in the tables."""
+
+    turned: Reals
+    upward: Counts
+    s: Reals
+    place: Reals
+    level: Reals
+    until: Reals
+    local: Reals
+    scale: Reals
 
 
 class MovingTables(NamedTuple):
@@ -125,7 +182,7 @@ class FixedMovingTables(NamedTuple):
     yield_bits: int
     stretch: int
     seen: Reals
-    elements: ElementTables
+    elements: FixedElementTables
 
     @property
     def used(self) -> bool:
@@ -235,19 +292,11 @@ class PlaysPart(Generic[T, F]):
     coded: Callable[[], F]
 
 
-def element_memory(t: ElementTables) -> ElementMemory:
-    """Memory for the elements of these tables; `Elements.unload` sets it."""
-    dtype, k, degree = t.piece.dtype, len(t.weight), (t.piece.shape[1] - 2) // 2
-    high, low, place, level, until = (np.zeros(k, dtype) for _ in range(5))
-    return ElementMemory(
-        np.zeros(1, dtype), np.ones(1, np.int64), high, low, place, level, until, np.zeros((k, degree), dtype)
-    )
-
-
 class Parallel(NamedTuple):
-    """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the input;
-    `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the error of
-    their sum in a data type, in the C (True) or of the law in double precision."""
+    """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
+    input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
+    error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
+    fixed point for steps of the input and of the sum; `coded_error`: bound on the error of their sum there."""
 
     weights: Array
     most: Array
@@ -255,6 +304,8 @@ class Parallel(NamedTuple):
     memory: ElementsInDouble
     tables: Callable[[Any], ElementTables]
     error: Callable[[Any, bool], float]
+    coded: Callable[[float, float], FixedElementTables]
+    coded_error: Callable[[], float]
 
 
 class Elements(NamedTuple):

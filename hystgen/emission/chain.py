@@ -241,11 +241,11 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         Field("unsigned int", "status"),
         *([*searched, *form.corners(inverse, plays)] if t.engine == "corners"
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
+        *[Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS")] * t.bent,
         *[
-            Field("signal_t", "bent", "contribution of each play", plays, "HYSTGEN_N_PLAYS"),
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
-        ] * t.bent,
+        ] * bool(t.bent or t.elements),
         *[
             Field("play_t", "turned", "input of the elements in parallel with the plays at their last turn"),
             Field("bool", "upward", "their input has risen since"),

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Codes, Compiled
     from hystgen.compensator.chain.moving import FixedMovingTables
     from hystgen.effects.bend import Bends
+    from hystgen.effects.plays import FixedElementTables
     from hystgen.model import Model
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
@@ -163,6 +164,12 @@ class FixedForm(Form):
                 ("BUMP_DEGREE", f"{plays.bump.coefficient.shape[1] - 1}u", ""),
                 ("BUMP_LIFT", f"{plays.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
                 ("BUMP_BITS", f"{plays.bump_bits}u", "bits of its values below a step of the plays' input"),
+            ]
+        if count := len(plays.elements.weight):
+            arrays += _elements(plays.elements, writer)
+            numbers += [
+                ("ELEMENTS", f"{count}u", "in parallel with the plays"),
+                ("PIECES", f"{len(plays.elements.begin)}u", "of their curve"),
             ]
         return arrays, numbers
 
@@ -349,6 +356,26 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
         *(text for curve in curves for text in curve),
         writer.rows("bump_t", "bump", rows, len(curves)),
         writer.array("uint16_t", "bump_of", list(t.bump_of)),
+    ]
+
+
+def _elements(t: FixedElementTables, writer: Writer) -> list[ConstantTable]:
+    """The pieces of the curve of elements in parallel with the plays, and the elements."""
+    pieces = [
+        f"{entries((*ends, *share), 'rrf')},\n     {{{entries(up)}}},\n     {{{entries(back)}}}, {scale}, {lift}"
+        for *ends, share, up, back, scale, lift in zip(
+            t.begin, t.level, t.share, t.up, t.back, t.scale, t.lift, strict=True
+        )
+    ]
+    rows = [
+        entries((*distance, *amplitude, *ends), "ffrrr")
+        for distance, amplitude, *ends in zip(
+            t.distance, t.amplitude, t.far, t.distance_lift, t.amplitude_lift, strict=True
+        )
+    ]
+    return [
+        writer.rows("piece_t", "piece", pieces, len(pieces)),
+        writer.rows("element_table_t", "element_table", rows, len(rows)),
     ]
 
 

@@ -58,6 +58,8 @@ extern const hystgen_factor_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_factor_t hystgen_standing_share;
 extern const hystgen_yield_t hystgen_yields[HYSTGEN_YIELDS];
 extern const hystgen_bump_t hystgen_bump[1];
+extern const hystgen_piece_t hystgen_piece[HYSTGEN_PIECES];
+extern const hystgen_element_table_t hystgen_element_table[HYSTGEN_ELEMENTS];
 extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #else
 #define HYSTGEN_FARTHEST_OFFSET 20.0f

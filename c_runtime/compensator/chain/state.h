@@ -132,6 +132,16 @@ typedef struct {
     hystgen_signal_t count;  /* samples since the start */
 } hystgen_clock_t;
 
+/* An element in parallel with the plays, at the last turn of its input. */
+typedef struct {
+    int64_t s;     /* z/width in the direction of the input, */
+    int64_t place; /* on the curve, */
+    int64_t level; /* the curve's value there, */
+    int64_t until; /* the distance to the end of its piece, */
+    int32_t c[5];  /* the coefficients of its mean slope from there on, */
+    uint8_t scale; /* and the right shift to the share of the piece's length */
+} hystgen_element_t;
+
 /* A search between two inputs of the plays, `low` and one above `top`, which are not tried again,
    for the one at which their sum is `sum`. It lies in the memory of an operator, not on its stack.
  */

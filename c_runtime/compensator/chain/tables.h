@@ -218,6 +218,28 @@ typedef struct {
     uint8_t lift;
 } hystgen_yield_t;
 
+/* A piece of the curve of elements in parallel with the plays: coefficients of its mean
+   slope from its begin on, and of the inverse over the share of its rise. */
+typedef struct {
+    int64_t begin;
+    int64_t level;
+    hystgen_factor_t share;
+    int32_t up[5];
+    int32_t back[5];
+    uint8_t scale; /* right shift from a distance to the share of the length in units of 2^-31 */
+    uint8_t lift;  /* bits of a value that the product with `share` needs in addition */
+} hystgen_piece_t;
+
+/* An element: factors from a move of the input, of at most `far`, to a distance on the curve, and
+   from there to the sum, without the bits that their products leave out. */
+typedef struct {
+    hystgen_factor_t distance;
+    hystgen_factor_t amplitude;
+    int64_t far;
+    uint8_t distance_lift;
+    uint8_t amplitude_lift;
+} hystgen_element_table_t;
+
 /* Stops, and the slope beyond them. */
 typedef struct {
     int64_t lower;

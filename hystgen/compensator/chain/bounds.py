@@ -228,11 +228,12 @@ def condition(compiled: Compiled) -> str:
     """The condition of `rounding` in words, if only the range bounds the difference between two drives; else "".
 
     A led lag misses its target by a second difference, so the plays and creep behind it see a signal other than the one
-    solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block in
-    front while the drive is limited: its memory of an earlier difference then moves the plays differently although the
-    drives are equal. Elements in parallel with the plays remember an earlier difference as well. Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag
-    behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays
-    or turns depends on the drives that it has seen.
+    solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block
+    in front while the drive is limited: its memory of an earlier difference then moves the plays differently
+    although the drives are equal. Elements in parallel with the plays remember an earlier difference as well.
+    Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag behind a slew
+    limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays or turns
+    depends on the drives that it has seen.
     """
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:

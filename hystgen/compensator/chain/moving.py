@@ -91,9 +91,10 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
     joining = [effect for effect in effects if effect.joins_plays()]
     if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
-        what = f"right after a reversal the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"
-        most = -parallel_slopes(static, joining)[0] / (slope - parallel_slopes(static, joining)[0])
-        yield joining[0], what + (f"; divide negative weights by more than {most:.3g}" if most > 0.0 else "")
+        falling = -parallel_slopes(static, joining)[0]
+        what = f"right after a turn the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"
+        room = slope + falling
+        yield joining[0], what + (f"; divide negative weights by more than {falling / room:.3g}" if room > 0.0 else "")
         return
     if not bending:
         return
@@ -302,7 +303,7 @@ def build(
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
     given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
     first, second, curve, number, share, inverse, yields = given
-    elements = joined[0].tables(dtype) if joined else at.no_elements(dtype)
+    elements = joined[0].tables(dtype) if joined else at.ElementTables.none(dtype)
     return at.MovingTables(
         moves, kind, first, second, curve, number, halves, turns, int(scanned), share, inverse, yields, elements
     )
@@ -371,12 +372,15 @@ def build_fixed(
     for mover in movers(static, effects):
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
+    unit = step * weight / int(plays.weight[0]) if weight > 0.0 else 0.0  # of the sum, output units
+    found = [each.coded(step, unit) for each in parallel(static, effects)]
+    elements = found[0] if found else at.FixedElementTables.none()
     return at.FixedMovingTables(
         own.moves, own.bends, own.scanned, first, second, farthest, near, max(32, 31 + near.bit_length()), relaxed,
         curves, np.array(bump.of, dtype=np.int64), bump.bits,
         np.array(rows, dtype=np.int64).reshape(-1, 7), bits, stretch_end,
         np.array(factor(float(own.number[at.SEEN])), dtype=np.int64),
-        at.no_elements(np.int64),
+        elements,
     )
 
 

@@ -99,4 +99,6 @@ def ordered(_: FixedMovingTables) -> bool:
     return False
 
 
-PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered))
+PLAYS = operators(
+    Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered)
+)

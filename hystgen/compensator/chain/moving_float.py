@@ -72,4 +72,6 @@ def ordered(m: at.MovingTables) -> bool:
     return m.moves in (at.PLAIN, at.DASHPOT)
 
 
-PLAYS = operators(Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, ordered))
+PLAYS = operators(
+    Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, ordered)
+)

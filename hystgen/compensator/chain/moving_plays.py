@@ -56,6 +56,9 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         for i in range(1, len(r)):
             z = moved(m, r, i, s.plays, s.lost, w) if s.own.moving[0] else resting(r, s.plays, i, w)
             total = total + p[i] * (s.bent[i] if z == play[i] else bent(m, plays, i, z))
+        if len(m.elements.weight) > 0 and s.own.moving[0]:
+            more, _ = joined(m.elements, s.elements, w)
+            total = total + more
         return total
 
     @jit

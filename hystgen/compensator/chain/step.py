@@ -20,7 +20,6 @@ from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, t
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.plays import ElementMemory, element_memory
 from hystgen.plays import loop
 from hystgen.plays.loop import State, loop_output
 from hystgen.plays.slots import (
@@ -86,7 +85,7 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), rounding remainder of each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), contribution of each play, if an effect moves or bends plays
-    elements: ElementMemory
+    elements: Any  # memory of the elements in parallel with the plays
     blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
     line: PreviewLine
@@ -109,7 +108,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         loops._replace(play=loops.play[:0]) if corners else loops,
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
-        element_memory(t.moving.elements),
+        t.moving.elements.memory(),
         tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
         np.where([inverse and part.forward for part in parts], 0, t.counts),
         PreviewLine(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),

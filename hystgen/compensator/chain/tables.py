@@ -53,8 +53,6 @@ def refusals(
                 yield from ((effect, reason) for reason in part.problems(effect, at))
         if effect.name.startswith(USER) and not effect.block:
             yield effect, "an effect of your own, which has no compensator"
-    for effect in (each for each in parts.plays if each.joins_plays() and ARITHMETICS[arithmetic].fixed):
-        yield effect, "elements in parallel with the plays are not available in fixed point; use float32"
     if operator != "inverse":
         yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
     yield from moving.problems(chain.cascade, parts.plays, seconds)

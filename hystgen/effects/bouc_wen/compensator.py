@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,11 @@ from hystgen.effects.bouc_wen.curve import halves
 from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach
 from hystgen.effects.bouc_wen.pieces import Pieces, largest, pieces
 from hystgen.effects.part import late
-from hystgen.effects.plays import ElementMemory, ElementTables, Elements, ElementsPart, Parallel
+from hystgen.effects.plays import ElementMemory, Elements, ElementsPart, ElementTables, Parallel
 
 DEGREE = 7
-"""Degree of the curve's polynomials in floating point: 13 to 23 pieces in float32, 80 to 150 in float64; with 3, float32
-would take 76 to 129."""
+"""Degree of the curve's polynomials in floating point: 15 to 40 pieces in float32, 100 to 200 in float64; with 3,
+float32 would take some 100."""
 
 FINEST, EXACT = 0.5, 1e-14
 """[unit roundoffs], [1] Error allowed for the curve in floating point: at least that of the curve itself, which
@@ -75,7 +76,8 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> Parallel:
     def error(dtype: Any, emitted: bool) -> float:
         found, unit = polynomials(dtype), float(np.finfo(dtype).eps) / 2
         off = (found.error, found.slip) if emitted else (EXACT, EXACT)
-        return float(np.abs(weights) @ widths) * drifted(exponent, off[0] + 8.0 * unit, off[1] + 16.0 * unit)
+        size = float(np.abs(weights) @ widths)
+        return size * drifted(exponent, off[0] + 8.0 * unit, off[1] + 16.0 * unit)
 
     def tables(dtype: Any) -> ElementTables:
         found = polynomials(dtype)
@@ -85,7 +87,11 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> Parallel:
         given = (rows, weights, weights * widths, 1.0 / widths)
         return ElementTables(*(np.array(each, dtype=dtype) for each in given))
 
-    return Parallel(weights, most * widths, steepest, Memory(effect), tables, error)
+    coded = late("bouc_wen", "of"), late("bouc_wen", "error")
+    return Parallel(
+        weights, most * widths, steepest, Memory(effect), tables, error,
+        lambda step, unit: coded[0]()(effect, step, unit), lambda: coded[1]()(effect),
+    )
 
 
 def drifted(exponent: float, error: float, slip: float) -> float:
@@ -96,7 +102,7 @@ def drifted(exponent: float, error: float, slip: float) -> float:
     shrinks by at least `4 b (e/2)^n` per distance, and grows by up to `2 slip max(1, b)`, so that it stays below
     `2 slip^(1/n)`, as b >= 1/2. Not proved for moves up and down different distances.
     """
-    return 2.0 * error + 2.0 * slip + 2.0 * slip ** (1.0 / exponent)
+    return 2.0 * error + 2.0 * slip + 2.0 * math.pow(slip, 1.0 / exponent)
 
 
 # ---------------------------------------------------------------- elements.c
@@ -124,8 +130,8 @@ def gained(t: ElementTables, m: ElementMemory, j: int, x: Scalar) -> tuple[Scala
     if x < x - x:
         return m.local[j, 0] * x, m.local[j, 0]
     if x < m.until[j]:
-        value = m.local[j, n - 1]
-        slope = value
+        value: Scalar = m.local[j, n - 1]
+        slope: Scalar = value
         for k in range(n - 2, -1, -1):
             value = value * x + m.local[j, k]
             slope = slope * x + value
@@ -146,7 +152,7 @@ def put(t: ElementTables, m: ElementMemory, j: int, s: Scalar) -> None:
     n = m.local.shape[1]
     i = piece_at(t, 1, s)
     u = s - t.piece[i, 1]
-    h = t.piece[i, 2 * n + 1]
+    h: Scalar = t.piece[i, 2 * n + 1]
     for k in range(2 * n, n + 1, -1):
         h = h * u + t.piece[i, k]
     h = h * u
@@ -198,8 +204,8 @@ def turn(t: ElementTables, m: ElementMemory, w: Scalar) -> None:
 def joined(t: ElementTables, m: ElementMemory, w: Scalar) -> tuple[Scalar, Scalar]:
     """The sum of the elements with their input at w, and its slope."""
     way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    total = way - way
-    slope = total
+    total: Scalar = way - way
+    slope: Scalar = total
     for j in range(len(t.weight)):
         more, steep = gained(t, m, j, way * t.inverse_width[j])
         total = total + t.amplitude[j] * (m.high[j] + more + m.low[j])

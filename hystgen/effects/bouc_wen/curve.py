@@ -93,16 +93,17 @@ def horner(coefficients: Array, x: float) -> float:
 
 @jit
 def _cells(m: float, c: float, n: float, wide: float, power: Array, cells: Array, ends: Array) -> int:
-    """Fill the cells, from m on, until m is 1 or all are full; returns the number filled."""
+    """Fill the cells, from m on, up to the one after that in which m reaches 1; returns the number filled."""
     ends[0] = m
     for i in range(len(cells)):
+        over = m >= 1.0
         _taylor(m, c, n, power, cells[i])
         middle = horner(cells[i], 0.5 * wide)
         _taylor(middle, c, n, power, cells[i])
         m = horner(cells[i], 0.5 * wide)
         m = min(m, 1.0) if c > 0.0 else m
         ends[i + 1] = m
-        if m >= 1.0:
+        if over:
             return i + 1
     return len(cells)
 
@@ -166,7 +167,7 @@ def _half(exponent: float, c: float) -> Half:
     wide = 1.0 / (CELLS * exponent * max(1.0, -c))
     # above 0, from 1 - s = 1/e on at the latest, 1 - s falls by a factor e per 1/n or faster; below 0, s falls steadily
     longest = 1.0 + BEYOND / exponent if c > 0.0 else 1.0
-    count = math.ceil(longest / wide)
+    count = math.ceil(longest / wide) + 1
     cells, ends = np.empty((count, DEGREE + 1)), np.empty(count + 1)
     begin = NEAR * horner(near, c * NEAR**exponent)
     count = _cells(begin, c, exponent, wide, power[: DEGREE + 1], cells, ends)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import functools
+import itertools
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from hystgen.effects.base import Array
-from hystgen.effects.bouc_wen.curve import halves
+from hystgen.effects.bouc_wen.curve import halves, size
 from hystgen.effects.bouc_wen.model import place_of, reach
 
 SAMPLES = 33
@@ -20,6 +22,9 @@ SLIP = 16.0
 
 NOISE = 1e-13
 """Error of a slope times the piece's length that the rounding of C itself, some 1e-15, causes in a polynomial."""
+
+MOST_SUM = 7.5
+"""Largest such sum, twice that for the curve itself: with slopes of up to 8, 31 bits hold both."""
 
 MOST_PIECES = 2000
 """Maximum number of pieces, a reserve: float64 takes some 100."""
@@ -58,21 +63,32 @@ def largest(width: float, exponent: float, balance: float, span: float) -> float
 
 
 @functools.lru_cache(maxsize=16)
-def pieces(exponent: float, balance: float, degree: int, allowed: float) -> Pieces:
+def pieces(exponent: float, balance: float, degree: int, allowed: float, shortest: float = 0.0) -> Pieces:
     """The curve as polynomials of a `degree`, from -1 until it is within `allowed` of 1; each errs by at most
-    `allowed`."""
+    `allowed`. `shortest`: if given, lengths are powers of 2, at least this one, and the polynomials of shares of a
+    piece and of its rise have coefficients that sum up to less than `MOST_SUM`."""
     above, below = halves(exponent, balance)
 
     def curve(x: Array) -> Array:
-        return np.array([reach(above, below, each) for each in x.tolist()])
+        return np.array([-size(below, -each) if each < 0.0 else size(above, each) for each in x.tolist()])
 
     first, last = place_of(above, below, -1.0), place_of(above, below, 1.0 - allowed)
     todo = [(0.0, last), (first, 0.0)]
-    begin, up, back, error, slip = [], [], [], 0.0, 0.0
+    if shortest:  # the curve goes on below -1 for another cell
+        fine = 2.0 ** math.floor(math.log2(float(below.wide[0])))
+        todo = [*[(a, b) for a, b in _powers(last, 0.5)][::-1], *[(-b, -a) for a, b in _powers(-first, fine)]]
+        first, last = todo[-1][0], todo[0][1]
+    begin: list[float] = []
+    up: list[Array] = []
+    back: list[Array] = []
+    error, slip = 0.0, 0.0
     while todo:
         a, b = todo.pop()
         there, missed, off = _fitted(curve, exponent, balance, degree, a, b)
-        if missed > allowed or off > SLIP * allowed + NOISE / (b - a):
+        rough = missed > allowed or off > SLIP * allowed + NOISE / (b - a)
+        if shortest:
+            rough = rough or _largest(there, a, b) > MOST_SUM
+        if rough and b - a >= 2.0 * shortest:
             if len(begin) + len(todo) > MOST_PIECES:
                 raise OverflowError("the curve bends too sharply")
             todo += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
@@ -83,6 +99,26 @@ def pieces(exponent: float, balance: float, degree: int, allowed: float) -> Piec
         error, slip = max(error, missed), max(slip, off)
     places = np.array([*begin, last])
     return Pieces(places, curve(places), np.array(up), np.array(back), error + allowed, slip)
+
+
+def _largest(polynomials: tuple[Array, Array], a: float, b: float) -> float:
+    """Sum of the coefficients of two polynomials, of the curve from a to b and of its inverse, over shares."""
+    there, back = polynomials
+    powers = np.arange(1, len(there) + 1)
+    rise = float(there @ (b - a) ** powers)
+    sums = np.abs(there) @ (b - a) ** (powers - 1), np.abs(back) @ rise**powers / (b - a)
+    return float(max(0.5 * sums[0], sums[1]))
+
+
+def _powers(length: float, fine: float) -> list[tuple[float, float]]:
+    """Adjacent intervals from 0 to `length`, rounded up to a multiple of `fine`, each a power of 2 long, the longest
+    first."""
+    left, ends = math.ceil(length / fine), [0.0]
+    while left:
+        power = 1 << (left.bit_length() - 1)
+        ends.append(ends[-1] + power * fine)
+        left -= power
+    return list(itertools.pairwise(ends))
 
 
 def _fitted(
