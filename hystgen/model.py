@@ -220,11 +220,15 @@ class Model:
         """'corners' or 'loop': the given engine, else the parameter file's; `auto` picks the better for `optimize`."""
         emit = self.parameters.emit
         if self.effects:
-            own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
+            own = [
+                effect.name
+                for effect in self.effects
+                if effect.moves_plays() or effect.bends_plays() or effect.joins_plays()
+            ]
             if own and (engine or emit.engine) == "corners":
                 raise UnsupportedEffectsError(
                     f"the corner engine derives plays from the turning points of the drive, but {' and '.join(own)} "
-                    "moves or bends each play in its own way; give --engine loop, or auto"
+                    "moves, bends or joins them in its own way; give --engine loop, or auto"
                 )
             if own:
                 return "loop"

@@ -77,6 +77,8 @@ EVERY = [
     make("saturation", level=2.0, centre=-0.7),
     make("resonance", shape="part", frequency=40.0, damping=0.05, share=0.3),
     make("slew_limit", shape="sudden", rate=30.0, falling_rate=20.0),
+    make("bouc_wen", weights=(-0.2, 0.1), widths=(0.7, 2.0), exponent=1.6, balance=1.4),
+    make("bouc_wen", shape="dahl", weights=(-0.3,), widths=(0.6,)),
 ]
 
 
@@ -169,6 +171,8 @@ NOTHING = [
     make("sensor_nonlinearity", coefficients=(0.0, 0.0), scale=1.0),
     make("noncongruent", coefficients=((0.0,), (0.0,), (0.0,))),
     make("noncongruent", shape="centre", amplitude=0.0, centre=1.0, width=1.0),
+    make("bouc_wen", weights=(0.0, 0.0), widths=(0.7, 5e-324), exponent=1.6, balance=1.4),
+    make("bouc_wen", shape="dahl", weights=(0.0,), widths=(1e30,)),
 ]
 
 
@@ -385,6 +389,13 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
             lambda a, c, w: {"shape": "centre", "amplitude": a, "centre": c, "width": w},
             st.floats(-1, 1e30, exclude_min=True), share, positive,
         ),
+    ),
+    "bouc_wen": st.builds(
+        lambda k, d, n, b: {"weights": (k,), "widths": (d,), "exponent": n, "balance": b},
+        share, positive, st.floats(1, 10), st.floats(0.5, 4),
+    )
+    | st.builds(
+        lambda k, d, e: {"shape": "dahl", "weights": (k, k), "widths": (d, e)}, share, positive, positive
     ),
 }  # fmt: skip
 
@@ -948,8 +959,8 @@ def test_sensor_polynomial_and_saturation_and_their_order() -> None:
 def test_order_of_the_chain_is_not_that_of_the_file() -> None:
     rng = np.random.default_rng(0)
     names = [
-        "delay", "slew_limit", "lag", "rate_dependence", "noncongruent", "creep", "ageing", "thermal", "resonance",
-        "saturation", "sensor_nonlinearity", "drift",
+        "delay", "slew_limit", "lag", "rate_dependence", "noncongruent", "bouc_wen", "creep", "ageing", "thermal",
+        "resonance", "saturation", "sensor_nonlinearity", "drift",
     ]  # fmt: skip
     first = {effect.name: effect for effect in reversed(EVERY)}
     listed = list(first.values())

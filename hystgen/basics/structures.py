@@ -72,6 +72,8 @@ SmallCount: TypeAlias = Annotated[NumberArray, "uint_least8_t"]
 Int32s: TypeAlias = Annotated[NumberArray, "const int32_t *"]  # pointers: only in C
 UInt8s: TypeAlias = Annotated[NumberArray, "const uint8_t *"]
 TwoReals: TypeAlias = Annotated[NumberArray, "real_t", 2]
+SevenReals: TypeAlias = Annotated[NumberArray, "real_t", 7]
+FiveInt32: TypeAlias = Annotated[NumberArray, "int32_t", 5]
 FourInt32: TypeAlias = Annotated[NumberArray, "int32_t", 4]
 FourNarrow: TypeAlias = Annotated[NumberArray, "narrow_t", 4]
 

@@ -141,6 +141,11 @@ class Ordered:
         return tuple(effect for effect in self.at(Place.PLAYS) if effect.bends_plays())
 
     @cached_property
+    def joining(self) -> tuple[Effect, ...]:
+        """The effects that add a term to the play sum."""
+        return tuple(effect for effect in self.at(Place.PLAYS) if effect.joins_plays())
+
+    @cached_property
     def mover(self) -> Effect | None:
         """The one effect that determines how the plays move, if any."""
         return next((effect for effect in self.at(Place.PLAYS) if effect.moves_plays()), None)
@@ -178,6 +183,13 @@ class Ordered:
         for effect in first:
             rows = effect.bent(rows, thresholds)
         return last.bent_sum(p, rows, thresholds)
+
+    def parallel(self, w: Array) -> Array:
+        """The terms (N,) in parallel with the plays, for their input `w` (N,)."""
+        total = np.zeros(len(w))
+        for effect in self.joining:
+            total += effect.parallel(w)
+        return total
 
     def mapped(self, h: Array, level: Array | float, run: Run) -> Array:
         """The output after its maps: limits act before the offset `level` is added, sensors after."""
@@ -230,7 +242,8 @@ class Chain(Ordered):
 
     def output(self, run: Run) -> Array:
         """Output (N,) of one run that starts at rest in the start memory."""
-        y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
+        w = self.play_input(run)
+        y = np.asarray(self.cascade.pi.weights) @ self.plays(w, run) + self.parallel(w)
         for effect in self.filters:
             y = effect.filtered(y, run)
         for effect in self.at(Place.GAIN):

@@ -21,7 +21,7 @@ from hystgen.basics.problems import EffectsError, NotInvertibleError, Unsupporte
 from hystgen.chain.chain import Chain, arriving_slack
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
-from hystgen.compensator.chain.parts import BEHIND, BESIDE, MOVES, PARTS, Parts
+from hystgen.compensator.chain.parts import BEHIND, BESIDE, ELEMENTS, MOVES, PARTS, Parts
 from hystgen.compensator.chain.step_float import ramp
 from hystgen.effects import CATALOGUE
 from hystgen.effects.base import Array, Block, Effect, Place, Run
@@ -58,6 +58,8 @@ class FrontAndPlays(Block):
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
         self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
         self.movement = None if chain.mover is None else MOVES.of(chain.mover, self.r, self.p)
+        self.elements = [ELEMENTS.of(effect, math.inf).memory for effect in chain.joining]
+        self.loaded = False
         self.start = np.array(pi.start)
         self.led_by: Leading | None = None
         self.start_over()
@@ -65,6 +67,7 @@ class FrontAndPlays(Block):
     def start_over(self) -> None:
         """Return to the start memory."""
         self.plays = self.start.copy()
+        self.loaded = False
         self.ascending = self.rises = True
         at = float(self.start[0])
         self.drive = float(self.static.front_inverse(at)) if self.static.start_is_defined else 0.0
@@ -81,11 +84,14 @@ class FrontAndPlays(Block):
         return self.movement.after(self.plays, float(self.plays[0]), w, self.seconds)
 
     def total(self, rows: Array) -> float:
-        """The weighted sum of the rows, bent where an effect bends them."""
-        return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
+        """The weighted sum of the rows, bent where an effect bends them, with the elements in parallel."""
+        beside = sum(each.total(float(rows[0])) for each in self.elements) if self.loaded else 0.0
+        return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0]) + beside
 
     def call(self, verb: str, x: float) -> float:
         """Solve or absorb, even for `rest` and `resting`: the first move from the start memory is like any other."""
+        if verb == "rest":  # elements in parallel begin unloaded
+            self.loaded = False
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
@@ -123,11 +129,15 @@ class FrontAndPlays(Block):
         if back > self.slack or back < 0.0:
             self.drive = x
         self.plays = self.moved(float(self.static.front(x, self.ascending)))
+        w = float(self.plays[0])
+        for each in self.elements:
+            each.move(w) if self.loaded else each.rest(w)
+        self.loaded = True
         return self.total(self.plays)
 
     def _input(self, y: float) -> float:
         """Input of the plays at which their sum is `y`."""
-        if self.movement is None and not self.chain.bending:
+        if self.movement is None and not self.chain.bending and not self.elements:
             return self._scan(y)
         w = float(self.plays[0])
         before = self.total(self.moved(w))

@@ -323,6 +323,16 @@ class Effect(BaseModel):
         """PLAYS: sum (N,) of the bent rows with weights `p`."""
         return np.asarray(p @ self.bent(rows, thresholds))
 
+    @classmethod
+    def joins_plays(cls) -> bool:
+        """Whether the effect adds a term to the play sum."""
+        return cls.parallel is not Effect.parallel
+
+    def parallel(self, w: Array) -> Array:
+        """PLAYS: the term (N,) in parallel with the plays, a function of their input `w` (N,) alone, which was at rest
+        at its first sample."""
+        return np.zeros(len(w))
+
     def filtered(self, h: Array, run: Run) -> Array:
         """LINEAR: every row of `h`, (N,) or (k, N), filtered separately, from rest at its first sample."""
         return h

@@ -8,6 +8,7 @@
 #include "effects/noncongruent/bent.c"
 #endif
 #ifdef HYSTGEN_ASKS_MOVES
+#include "effects/bouc_wen/elements.c"
 #ifdef HYSTGEN_HAS_DASHPOT_PLAYS
 #include "effects/rate_dependence/dashpot.c"
 #else

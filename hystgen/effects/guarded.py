@@ -20,6 +20,7 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
     "summed": lambda _, w, *__: w.shape,
     "bent": lambda rows, *_: rows.shape,
     "bent_sum": lambda _, rows, *__: rows.shape[1:],
+    "parallel": lambda w: w.shape,
     "filtered": lambda h, *_: h.shape,
     "gain": lambda run: run.t.shape,
     "offset": lambda run: run.t.shape,

@@ -12,7 +12,20 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.structures import FourInt32, Int32, Int64, Literal, Real, Struct, UInt8, UInt32, note
+from hystgen.basics.structures import (
+    AnyFactor,
+    FiveInt32,
+    FourInt32,
+    Int32,
+    Int64,
+    Literal,
+    Real,
+    SevenReals,
+    Struct,
+    UInt8,
+    UInt32,
+    note,
+)
 from hystgen.effects.base import Array
 from hystgen.effects.bend import Bends
 from hystgen.effects.part import Function
@@ -92,6 +105,106 @@ class MovingNumbers(Struct):
     standing_share: Real = note("share of a step after which the input is taken as standing still")
 
 
+class ElementState(Struct):
+    """An element in parallel with the plays, at the last turn of its input."""
+
+    high: Real = note("z/width in the direction of the input,")
+    low: Real = note("and its rounding remainder")
+    place: Real = note("on the curve,")
+    level: Real = note("the curve's value there,")
+    until: Real = note("the distance to the end of its piece,")
+    c: SevenReals = note("and its coefficients from there on")
+
+
+class FixedElementState(Struct):
+    """An element in parallel with the plays, at the last turn of its input."""
+
+    s: Int64 = note("z/width in the direction of the input,")
+    place: Int64 = note("on the curve,")
+    level: Int64 = note("the curve's value there,")
+    until: Int64 = note("the distance to the end of its piece,")
+    c: FiveInt32 = note("the coefficients of its mean slope from there on,")
+    scale: UInt8 = note("and the right shift to the share of the piece's length")
+
+
+class FixedPiece(Struct):
+    """A piece of the curve of elements in parallel with the plays: its begin and the curve's value there, both with 44
+    bits, coefficients of the mean slope from there on, and of the inverse over the share of the piece's rise."""
+
+    begin: Int64
+    level: Int64
+    share: AnyFactor
+    up: FiveInt32
+    back: FiveInt32
+    scale: UInt8 = note("right shift from a distance to the share of the length in units of 2^-31")
+    lift: UInt8 = note("bits of a value that the product with `share` needs in addition")
+
+
+class FixedElement(Struct):
+    """An element: factors from a move of the input, of at most `far`, to a distance on the curve, and from there to the
+    sum, without the bits that their products leave out."""
+
+    distance: AnyFactor
+    amplitude: AnyFactor
+    far: Int64
+    distance_lift: UInt8
+    amplitude_lift: UInt8
+
+
+class ElementNumbers(Struct):
+    """Numbers of an element in floating point, in C arrays."""
+
+    weight: Real = note("of z")
+    amplitude: Real = note("of z/width")
+    inverse_width: Real
+
+
+E = TypeVar("E", ElementState, FixedElementState)
+
+
+class ElementsState(NamedTuple, Generic[E]):
+    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); each element."""
+
+    turned: Reals
+    upward: Counts
+    element: E
+
+
+class ElementTables(NamedTuple):
+    """Constants of elements (k,) in parallel with the plays, which follow one curve. `piece` (K + 1, 2 + 2 D): where
+    each piece of the curve begins, its value there, and the coefficients of the curve and of its inverse from there
+    on."""
+
+    piece: Reals
+    element: ElementNumbers
+
+    @classmethod
+    def none(cls, dtype: Any) -> ElementTables:
+        """The tables of a model without elements."""
+        return cls(np.zeros((1, 4), dtype), ElementNumbers.zeros(0, dtype))
+
+    def memory(self) -> ElementsState[ElementState]:
+        """Memory for these elements; `Elements.unload` sets it."""
+        dtype = self.piece.dtype
+        return ElementsState(np.zeros(1, dtype), np.ones(1, np.int64), ElementState.zeros(len(self.element), dtype))
+
+
+class FixedElementTables(NamedTuple):
+    """The same in fixed point: pieces (K + 1,) of the curve, and elements (k,)."""
+
+    piece: FixedPiece
+    element: FixedElement
+
+    @classmethod
+    def none(cls) -> FixedElementTables:
+        """The tables of a model without elements."""
+        return cls(FixedPiece.zeros(1), FixedElement.zeros(0))
+
+    def memory(self) -> ElementsState[FixedElementState]:
+        """Memory for these elements; `Elements.unload` sets it."""
+        return ElementsState(np.zeros(1, np.int64), np.ones(1, np.int64), FixedElementState.zeros(len(self.element)))
+
+
 class MovingTables(NamedTuple):
     """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
     unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
@@ -109,11 +222,12 @@ class MovingTables(NamedTuple):
     share: Reals  # p_i b1 (n + 1,), if scanned
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
     yields: Reals  # (K, 5): yields of a nonlinear dashpot, by pieces
+    elements: ElementTables
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
-        return self.moves != PLAIN or self.bends != STRAIGHT
+        """Whether an effect moves, bends or joins the plays; if not, the loop engine solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT or len(self.elements.element) > 0
 
 
 class FixedMovingTables(NamedTuple):
@@ -140,11 +254,12 @@ class FixedMovingTables(NamedTuple):
     yield_bits: int
     stretch: int
     seen: Reals
+    elements: FixedElementTables
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; if not, the loop engine solves for them."""
-        return self.moves != PLAIN or self.bends != STRAIGHT
+        """Whether an effect moves, bends or joins the plays; if not, the loop engine solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT or len(self.elements.element) > 0
 
 
 class Moved(NamedTuple):
@@ -193,6 +308,14 @@ class Mover(Protocol):
     def disorder(self, rows: Array, top: float) -> float: ...
 
 
+class ElementsInDouble(Protocol):
+    """Elements in double precision: brought to rest at an input, their sum if the input moved there, and that move."""
+
+    def rest(self, w: float) -> None: ...
+    def total(self, w: float) -> float: ...
+    def move(self, w: float) -> None: ...
+
+
 class Bent(NamedTuple):
     """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingNumbers`; `bump` of
     play i > 0: a key that plays with the same bend share, and its contribution minus the play itself."""
@@ -239,3 +362,38 @@ class PlaysPart(Generic[T, F]):
     of: Callable[..., T]
     floating: F
     coded: Callable[[], F]
+
+
+class Parallel(NamedTuple):
+    """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
+    input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
+    error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
+    fixed point for steps of the input and of the sum; `coded_error`: bound on the error of their sum there."""
+
+    weights: Array
+    most: Array
+    steepest: Array
+    memory: ElementsInDouble
+    tables: Callable[[Any], ElementTables]
+    error: Callable[[Any, bool], float]
+    coded: Callable[[float, float], FixedElementTables]
+    coded_error: Callable[[], float]
+
+
+class Elements(NamedTuple):
+    """The functions of elements in one arithmetic, of tables, memory and the input: `joined`: their sum, and in
+    floating point its slope; `turn`: turns them there; `unload`: brings them to rest there."""
+
+    joined: Function
+    turn: Function
+    unload: Function
+
+
+@dataclass(frozen=True)
+class ElementsPart:
+    """An effect in parallel with the plays: `of` describes it, from the effect and the span of its input; `floating`:
+    its functions; `coded` loads them in fixed point."""
+
+    of: Callable[..., Parallel]
+    floating: Elements
+    coded: Callable[[], Elements]

@@ -2,8 +2,9 @@
 
 `SOURCES` in an effect's folder lists them by use, callees before callers. `blocks`: its blocks; `drives`: blocks that
 convert drives into signals; `limits`: drives before they become signals; `brake`: such drives if a block behind them
-must not overshoot; `bends`: a play's contribution; `calls`: functions of the interface. Plays whose input is found by a
-search are named by how they move; with `alone` appended, those that are solved for one by one.
+must not overshoot; `bends`: a play's contribution; `elements`: elements in parallel with the plays; `calls`: functions
+of the interface. Plays whose input is found by a search are named by how they move; with `alone` appended, those that
+are solved for one by one.
 """
 
 from __future__ import annotations

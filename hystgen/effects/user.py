@@ -26,7 +26,7 @@ class _AsItStands(importlib.machinery.SourceFileLoader):
 
 METHODS = {
     Place.DRIVE: ("drive",),
-    Place.PLAYS: ("plays", "bent"),
+    Place.PLAYS: ("plays", "bent", "parallel"),
     Place.LINEAR: ("filtered",),
     Place.GAIN: ("gain", "offset"),
     Place.OUTPUT: ("mapped",),

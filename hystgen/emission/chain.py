@@ -224,11 +224,16 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         Field("unsigned int", "status"),
         *([*searched, *form.corners(inverse, plays)] if t.engine == "corners"
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), length)]),
+        *[Field("signal_t", "bent", "contribution of each play", "HYSTGEN_N_PLAYS")] * t.bent,
         *[
-            Field("signal_t", "bent", "contribution of each play", "HYSTGEN_N_PLAYS"),
             Field("signal_t", "staying", "sum of the plays that have not moved lately"),
             Field("unsigned int", "released", "the last of the plays that have"),
-        ] * t.bent,
+        ] * bool(t.bent or t.elements),
+        *[
+            Field("play_t", "turned", "input of the elements in parallel with the plays at their last turn"),
+            Field("bool", "upward", "their input has risen since"),
+            Field("element_t", "element", "", "HYSTGEN_ELEMENTS"),
+        ] * bool(t.elements),
         *[Field("search_t", "search", "for the input of the plays")] * (inverse and bool(t.bends)),
     ]
 

@@ -14,16 +14,25 @@ from hystgen.compensator.chain.step import QuietState, RampState, SteadyState
 from hystgen.effects.bend import BendCurve, Bump, SmoothLimit
 from hystgen.effects.kinds import BlockKind
 from hystgen.effects.maps import FixedStops
-from hystgen.effects.plays import FixedSearchState, FixedYield, SearchState
+from hystgen.effects.plays import (
+    ElementState,
+    FixedElement,
+    FixedElementState,
+    FixedPiece,
+    FixedSearchState,
+    FixedYield,
+    SearchState,
+)
 from hystgen.emission.runtime import Field, Piece, declared_type
 from hystgen.emission.text import WIDTH
 
 IN_BOTH: Mapping[str, type[Struct]] = {"ramp_t": RampState, "quiet_t": QuietState, "steady_t": SteadyState}
 OTHERS: Mapping[str, Mapping[str, type[Struct]]] = {
-    "float": {"search_t": SearchState},
+    "float": {"search_t": SearchState, "element_t": ElementState},
     "fixed": {
         "factor_t": Factor, "number_t": FixedNumber, "bend_curve_t": BendCurve, "bend_t": SmoothLimit, "bump_t": Bump,
-        "stops_t": FixedStops, "yield_t": FixedYield, "search_t": FixedSearchState,
+        "stops_t": FixedStops, "yield_t": FixedYield, "search_t": FixedSearchState, "piece_t": FixedPiece,
+        "element_table_t": FixedElement, "element_t": FixedElementState,
     },
 }
 """Structures besides those of blocks, by their names in C without prefix."""

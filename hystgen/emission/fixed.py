@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Codes, Compiled
     from hystgen.compensator.chain.moving import FixedMovingTables
     from hystgen.effects.bend import Bends
+    from hystgen.effects.plays import FixedElementTables
     from hystgen.model import Model
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
@@ -164,6 +165,12 @@ class FixedForm(Form):
                 ("BUMP_DEGREE", f"{plays.bump.coefficient.shape[1] - 1}u", ""),
                 ("BUMP_LIFT", f"{plays.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
                 ("BUMP_BITS", f"{plays.bump_bits}u", "bits of its values below a step of the plays' input"),
+            ]
+        if count := len(plays.elements.element):
+            arrays += _elements(plays.elements, writer)
+            numbers += [
+                ("ELEMENTS", f"{count}u", "in parallel with the plays"),
+                ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
             ]
         return arrays, numbers
 
@@ -334,6 +341,15 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
         *(text for curve in curves for text in curve),
         writer.rows("bump_t", "bump", rows, len(curves)),
         writer.array("uint16_t", "bump_of", list(t.bump_of)),
+    ]
+
+
+def _elements(t: FixedElementTables, writer: Writer) -> list[ConstantTable]:
+    """The pieces of the curve of elements in parallel with the plays, and the elements."""
+    arrays = (("piece_t", "piece", t.piece), ("element_table_t", "element_table", t.element))
+    return [
+        writer.rows(kind, name, [", ".join(members(type(part), row)) for row in part], len(part))
+        for kind, name, part in arrays
     ]
 
 

@@ -112,9 +112,15 @@ class FloatingForm(Form):
         for name, rows, wanted in (
             ("yields", plays.yields, plays.moves == moving.DASHPOT),
             ("curve", plays.curve, plays.bends == moving.POLYNOMIAL),
+            ("piece", plays.elements.piece, len(plays.elements.element) > 0),
         ):
             if wanted:
                 arrays.append(writer.rows("real_t", name, map(entries, rows), *rows.shape))
+        if len(plays.elements.element):
+            arrays += [
+                writer.array("real_t", f"element_{name}", list(getattr(plays.elements.element, name)))
+                for name in type(plays.elements.element).members()
+            ]
         return arrays, [
             *macros_of(plays.number),
             ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
@@ -122,6 +128,8 @@ class FloatingForm(Form):
             ("HALVES", f"{plays.halves}u", "and by halving after them"),
             ("TURNS", f"{plays.turns}u", "steps to the reciprocal of a slope"),
             ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
+            ("ELEMENTS", f"{len(plays.elements.element)}u", "in parallel with the plays"),
+            ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
         ]
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:

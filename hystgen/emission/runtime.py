@@ -244,7 +244,8 @@ class Variant:
     starts at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind the
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
     `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
-    add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
+    add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
+    `elements`: number of elements in parallel with them.
     """
 
     engine: str
@@ -264,6 +265,7 @@ class Variant:
     calls: frozenset[str] = frozenset()
     moves: str = ""
     bends: str = ""
+    elements: int = 0
 
     @property
     def apart(self) -> tuple[str, ...]:
@@ -282,7 +284,7 @@ class Variant:
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waiting, "PREVIEW": self.taps,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
-            "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre",
+            "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre", "ELEMENTS": self.elements,
             "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
         }
@@ -316,7 +318,7 @@ class Variant:
             plays = (solve, *files(f"{self.moves} alone"), refined)
         else:
             tried = (f"{chain}attempt.h",) * (self.family.kind == "float")
-            moved = (*tried, *files("bends"), *files(self.moves))
+            moved = (*tried, *files("bends"), *files(self.moves), *files("elements") * bool(self.elements))
             plays = (*moved, f"{chain}moving_plays.c", f"{chain}moving_search.c", refined)
         brake = files("brake") if self.braked else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)

@@ -17,6 +17,8 @@
 #define HYSTGEN_TAPS 3u
 #define HYSTGEN_QUIET 8u
 #define HYSTGEN_YIELDS 8u
+#define HYSTGEN_ELEMENTS 2u
+#define HYSTGEN_PIECES 20u
 
 #ifdef HYSTGEN_FIXED
 #define HYSTGEN_FINE_MIN (-32767)
@@ -56,6 +58,8 @@ extern const hystgen_factor_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_factor_t hystgen_standing_share;
 extern const hystgen_yield_t hystgen_yields[HYSTGEN_YIELDS];
 extern const hystgen_bump_t hystgen_bump[1];
+extern const hystgen_piece_t hystgen_piece[HYSTGEN_PIECES];
+extern const hystgen_element_table_t hystgen_element_table[HYSTGEN_ELEMENTS];
 extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #else
 #define HYSTGEN_FARTHEST_OFFSET 20.0f
@@ -95,6 +99,10 @@ extern const hystgen_real_t hystgen_kept[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_real_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_real_t hystgen_yields[HYSTGEN_YIELDS][5];
 extern const hystgen_real_t hystgen_curve[HYSTGEN_N_PLAYS + 1][HYSTGEN_TERMS];
+extern const hystgen_real_t hystgen_piece[HYSTGEN_PIECES][16];
+extern const hystgen_real_t hystgen_element_weight[HYSTGEN_ELEMENTS];
+extern const hystgen_real_t hystgen_element_amplitude[HYSTGEN_ELEMENTS];
+extern const hystgen_real_t hystgen_element_inverse_width[HYSTGEN_ELEMENTS];
 #endif
 
 extern const hystgen_factor_t hystgen_waited[1];
@@ -133,6 +141,9 @@ typedef struct {
     hystgen_sum_t bent[HYSTGEN_N_PLAYS];
     hystgen_sum_t staying;
     unsigned int released;
+    hystgen_play_t turned;
+    bool upward;
+    hystgen_element_t element[HYSTGEN_ELEMENTS];
     hystgen_search_t search;
 #else
     bool sought;

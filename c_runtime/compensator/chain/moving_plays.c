@@ -8,6 +8,87 @@
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
 
+#ifdef HYSTGEN_HAS_ELEMENTS
+/* The distance of w from the last turn of the elements, in the direction in which they move. */
+static inline hystgen_sum_t hystgen_operator_way(const hystgen_operator_t *self, hystgen_play_t w) {
+    const hystgen_sum_t rise = (hystgen_sum_t)w - self->turned;
+    return self->upward ? rise : -rise;
+}
+
+/* The elements turn at the present input of the plays. */
+HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
+    const hystgen_sum_t way = hystgen_operator_way(self, self->play[0]);
+    unsigned int j;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_element_turn(&self->element[j], hystgen_element_distance(j, way));
+    }
+    self->turned = self->play[0];
+    self->upward = !self->upward;
+}
+
+#ifdef HYSTGEN_FIXED
+/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
+   at rest. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
+                                                    hystgen_play_t w) {
+    const hystgen_sum_t way = hystgen_operator_way(self, w);
+    hystgen_sum_t sum = 0;
+    unsigned int j;
+    if (!self->moving) {
+        return 0;
+    }
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way));
+    }
+    return self->upward ? sum : -sum;
+}
+#else
+/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
+   at rest. Sets its slope. */
+HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
+                                                    hystgen_play_t w, hystgen_sum_t *slope) {
+    const hystgen_sum_t way = hystgen_operator_way(self, w);
+    hystgen_sum_t sum = 0;
+    unsigned int j;
+    *slope = 0;
+    if (!self->moving) {
+        return 0;
+    }
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_sum_t change;
+        const hystgen_sum_t s =
+            hystgen_element_at(&self->element[j], hystgen_element_distance(j, way), &change);
+        sum = sum + hystgen_element_amplitude[j] * s;
+        *slope = *slope + hystgen_element_weight[j] * change;
+    }
+    return self->upward ? sum : -sum;
+}
+#endif
+
+/* The elements turn where their input, on its way to w, moves in the other direction; or they come
+   to rest there. Returns whether they have turned. */
+static bool hystgen_operator_elements(hystgen_operator_t *self, hystgen_play_t w) {
+    unsigned int j;
+    if (self->moving) {
+        const bool turns = self->upward ? w < self->play[0] : w > self->play[0];
+        if (turns) {
+            hystgen_operator_turn_elements(self);
+        }
+        return turns;
+    }
+    self->turned = w;
+    self->upward = true;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        hystgen_element_unload(&self->element[j]);
+    }
+    return false;
+}
+#endif
+
 /* Play i at rest with its input at w. */
 static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
                                       hystgen_play_t w) {
@@ -64,6 +145,9 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     for (i = 1; i <= self->released; ++i) {
         sum += hystgen_model_tables.weight[i] * hystgen_bent(i, hystgen_resting(i, self->play, w));
     }
+#ifdef HYSTGEN_HAS_ELEMENTS
+    sum += hystgen_operator_joined(self, w);
+#endif
     return sum;
 }
 
@@ -80,6 +164,9 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     self->play[0] = w;
     if (self->play[self->released] == before) {
         self->staying = sum - (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+#ifdef HYSTGEN_HAS_ELEMENTS
+        self->staying -= hystgen_operator_joined(self, w);
+#endif
         self->released = 0;
     }
     self->level = hystgen_level(sum);
@@ -93,7 +180,12 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
         self->released = HYSTGEN_N_PLAYS;
     }
 #ifdef HYSTGEN_INVERSE
-    if (!self->moving || w != self->search.input) {
+#ifdef HYSTGEN_HAS_ELEMENTS
+    const bool turned = hystgen_operator_elements(self, w);
+#else
+    const bool turned = false;
+#endif
+    if (!self->moving || turned || w != self->search.input) {
         hystgen_operator_release(self, w);
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);
@@ -101,6 +193,9 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
     self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
     hystgen_operator_move(self, w, self->search.found);
 #else
+#ifdef HYSTGEN_HAS_ELEMENTS
+    (void)hystgen_operator_elements(self, w);
+#endif
     hystgen_operator_release(self, w);
     hystgen_operator_move(self, w, hystgen_operator_sum(self, w));
 #endif
@@ -110,6 +205,9 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    sum += hystgen_operator_joined(self, w);
+#endif
 #ifdef HYSTGEN_HAS_DILATED_PLAYS
     if (self->moving && w != self->play[0]) { /* thresholds grow only with a move */
 #else
@@ -134,6 +232,10 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     const hystgen_play_t x = self->play[0];
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    (void)hystgen_operator_elements(self, w);
+    sum += hystgen_operator_joined(self, w);
+#endif
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (self->moving) {
@@ -233,8 +335,15 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t *bent = hystgen_operator_bent(self);
+#ifdef HYSTGEN_HAS_ELEMENTS
+    hystgen_sum_t slope;
+    (void)hystgen_operator_elements(self, w);
+#endif
     if (self->moving) {
         self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
+#ifdef HYSTGEN_HAS_ELEMENTS
+        self->level = self->level + hystgen_operator_joined(self, w, &slope);
+#endif
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
 #endif

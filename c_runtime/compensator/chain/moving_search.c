@@ -6,6 +6,18 @@
 #endif
 #include "compensator/chain/signals.c"
 
+#ifdef HYSTGEN_HAS_ELEMENTS
+/* Turns the elements if the input at which the sum is h lies behind them. Returns whether it does.
+ */
+static bool hystgen_inverse_turns(hystgen_inverse_t *self, hystgen_signal_t h) {
+    const bool turns = self->moving && (self->upward ? h < self->level : h > self->level);
+    if (turns) {
+        hystgen_inverse_turn_elements(self);
+    }
+    return turns;
+}
+#endif
+
 #ifdef HYSTGEN_FIXED
 /* The search goes on from the input tried last by the slope of the sum, as long as this leads to an
    input inside the interval and has not been done too often; else it halves the interval. Both
@@ -76,6 +88,11 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
+#ifdef HYSTGEN_HAS_ELEMENTS
+    const bool turns = hystgen_inverse_turns(self, h);
+#else
+    const bool turns = false;
+#endif
     self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
     self->search.top = HYSTGEN_LARGEST_INPUT;
     self->search.short_of = 0;
@@ -84,9 +101,12 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     self->search.tries = 0;
     self->search.input = self->play[0];
     self->search.before = self->play[0];
-#ifndef HYSTGEN_HAS_PLAIN_PLAYS
-    self->search.found = hystgen_inverse_sum(self, self->search.input);
-#endif /* they have just followed an input, at which their sum is known */
+#ifdef HYSTGEN_HAS_PLAIN_PLAYS
+    if (turns) /* else they have just followed an input, at which their sum is known */
+#endif
+    {
+        self->search.found = hystgen_inverse_sum(self, self->search.input);
+    }
     while (!hystgen_inverse_over(&self->search)) {
         hystgen_inverse_advance(&self->search);
 #ifdef HYSTGEN_HAS_PLAIN_PLAYS
@@ -149,6 +169,12 @@ static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_
         }
     }
 #endif
+#ifdef HYSTGEN_HAS_ELEMENTS
+    hystgen_sum_t more;
+    at->sum = at->sum + hystgen_operator_joined(self, at->input, &more);
+    at->steady = at->steady + more;
+    at->slope = at->slope + more;
+#endif
 }
 
 /* left/slope. */
@@ -207,6 +233,9 @@ bool hystgen_inverse_solves(hystgen_attempt_t *at, unsigned int k) {
 HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_real_t h) {
     hystgen_attempt_t at;
     unsigned int k;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    (void)hystgen_inverse_turns(self, h);
+#endif
     at.low = HYSTGEN_LEAST_INPUT;
     at.high = HYSTGEN_LARGEST_INPUT;
     at.input = self->play[0];

@@ -56,6 +56,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
     drive = max(abs(end) for end in static.input_range)
     bent = moving.largest_bend(static, compiled.parts.plays)
     plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
+    plays += moving.largest_parallel(static, compiled.parts.plays)
     output = plays * math.prod(one.growth for one in compiled.behind)
     ends = [abs(float(t.limits.output.low[0])), abs(float(t.limits.output.high[0]))]
     settings = 2.0 * max(ends) * (1 + 3 * t.number_of("clock"))  # a drift has six roundings of its own
@@ -94,6 +95,7 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
     low, high = static.play_range
     size = 3.0 * max(abs(low), abs(high)) + float(static.pi.thresholds[-1])
     summed = moving.sum_rounding(static, compiled.parts.plays, u)
+    summed += sum(each.error(kind, emitted) for each in moving.parallel(static, compiled.parts.plays))
     play = 4.0 * u * size
     if t.moves == RELAXING:
         slow = t.first[1:].astype(float)
@@ -226,11 +228,12 @@ def condition(compiled: Compiled) -> str:
     """The condition of `rounding` in words, if only the range bounds the difference between two drives; else "".
 
     A led lag misses its target by a second difference, so the plays and creep behind it see a signal other than the one
-    solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block in
-    front while the drive is limited: its memory of an earlier difference then moves the plays differently although the
-    drives are equal. Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag
-    behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays
-    or turns depends on the drives that it has seen.
+    solved for; their memories then differ for two drives, and the lead amplifies that. So does a user's own block
+    in front while the drive is limited: its memory of an earlier difference then moves the plays differently
+    although the drives are equal. Elements in parallel with the plays remember an earlier difference as well.
+    Thresholds that grow with the rate amplify an earlier difference between drives. A braked lag behind a slew
+    limit gives up more of its lead than the limit cuts off. In front of two branches, whether a lag stays or turns
+    depends on the drives that it has seen.
     """
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
@@ -238,7 +241,8 @@ def condition(compiled: Compiled) -> str:
     missed = any(one.misses for one in ahead_of(compiled.ones))
     remembered = compiled.static.pi.n > 0 or any(one.remembers for one in compiled.behind)
     dilated = compiled.tables.moving.moves == DILATED
-    return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
+    joined = any(effect.joins_plays() for effect in compiled.parts.plays)
+    return together(SAME, still) if dilated or joined or compiled.tables.turning or (missed and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:

@@ -33,6 +33,8 @@ from hystgen.compensator.chain.moving import (
     least_dilated,
     least_slope,
     of_shifts,
+    parallel,
+    parallel_slopes,
     steepest_bend,
     yield_error,
 )
@@ -230,6 +232,7 @@ class Bounds:
         slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # rounded weights of the bends
         shifted, counting = of_shifts(self.static, self.parts.plays, t.moves, np.array(plays))
         bumps = math.fsum(map(abs, self.static.pi.weights[1:])) * self.bumps.error * step
+        bumps += sum(each.coded_error() for each in parallel(self.static, self.parts.plays))
         lsb = float(self.inner.output_lsb)
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
@@ -245,10 +248,11 @@ class Bounds:
         """Largest change of the sum of the plays per change of their input, over all samples."""
         first, *others = map(abs, self.static.pi.weights)
         dilated = self.tables.moving.moves == DILATED
+        joined = parallel_slopes(self.static, self.parts.plays)[1]
         if not dilated and not self.bumps.curves:
-            return float(self.static.pi.slopes[-1])
+            return float(self.static.pi.slopes[-1]) + joined
         more = (p * (1.0 + 2.0 * wider * dilated) for p, (wider, _) in zip(others, self._shares, strict=True))
-        return float(first + self._bent * math.fsum(more))
+        return float(first + self._bent * math.fsum(more)) + joined
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
         """Error of the plays' sum, in output codes, for an error in front of the memoryless part; `way`: default
@@ -337,7 +341,7 @@ class Bounds:
         """Largest change of the drive in front of the memoryless part per change of the plays' sum, for plays that have
         seen the same drives."""
         least = float(self.static.pi.weights[0])
-        if self.bumps.curves:
+        if self.bumps.curves or self._joined:
             least = least_slope(self.static, self.parts.plays)
         if self.tables.moving.moves == DILATED:
             least = min(least, least_dilated(self.static, self.parts.plays, self.seconds))
@@ -351,7 +355,7 @@ class Bounds:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
             return 1.0 / least / self.static.front_slopes[0]
         if self.tables.moving.used:  # as in floating point
-            bent = bool(self.bumps.curves)
+            bent = bool(self.bumps.curves) or self._joined
             least = least_slope(self.static, self.parts.plays) if bent else self.static.pi.weights[0]
             return 2.0 / least / self.static.front_slopes[0]
         return float(self.inner.gain())
@@ -378,11 +382,16 @@ class Bounds:
         return math.floor(2.0 * (self._found_error(0.0) if self.condition else self._arriving_error(0.0)))
 
     @property
+    def _joined(self) -> bool:
+        """Whether elements are in parallel with the plays, which remember an earlier difference between drives."""
+        return len(self.tables.moving.elements.element) > 0
+
+    @property
     def condition(self) -> str:
         """The condition of `rounding` in words, if only the range bounds the difference between two drives; else ""."""
         missed = any(each.one.misses for each in self._ahead)
-        dilated = self.tables.moving.moves == DILATED
-        if not (missed or dilated or (self.formats[NAMES[LED]] and (not self.reached or self.parts.slew))):
+        remembered = self.tables.moving.moves == DILATED or self._joined
+        if not (missed or remembered or (self.formats[NAMES[LED]] and (not self.reached or self.parts.slew))):
             return ""
         still = STILL * (self.tables.quiet > 0)
         if not self.reached:

@@ -113,7 +113,7 @@ class _Builder:
         plain = dataclasses.replace(static, output_offset=0.0)
         inner = (self.drive_lsb, self.output_lsb)
         beyond, self.reached = self._beyond() if self.ones[NAMES[LED]] else (0, True)
-        bent = moving.largest_bend(static, self.parts.plays)
+        bent = self._beside
         self.inner = Builder(plain, self.arithmetic, self.engine, inner, self.given, beyond, bool(self.leading), bent)
         plays, _ = self.inner.build()
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
@@ -183,7 +183,7 @@ class _Builder:
         """The signals behind the plays."""
         static, slack = self.static, 1.0 + 2.0**-20
         w = max(*map(abs, static.play_range), *map(abs, static.pi.start))
-        w += moving.largest_bend(static, self.parts.plays)
+        w += self._beside
         size = plays = self._code(math.fsum(static.pi.weights) * w) * slack + 1.0
         span = self._code(self.high - self.low)
         margin, blocks = Margin(slack, span), [(part, one) for part in BEHIND for one in self.ones[part.name]]
@@ -221,6 +221,12 @@ class _Builder:
                 wanted[part.name][j] = asked
                 asked = self.ones[part.name][j].asked(given[part.name][j], asked, margin)
         return Sizes(plays, given, wanted, mapped, size + away, undone, inverted[::-1], target, asked)
+
+    @property
+    def _beside(self) -> float:
+        """By how much contributions differ from the plays, with elements in parallel counted as a difference of all."""
+        elements = moving.largest_parallel(self.static, self.parts.plays) / math.fsum(map(abs, self.static.pi.weights))
+        return moving.largest_bend(self.static, self.parts.plays) + elements
 
     @cached_property
     def _unlimited(self) -> tuple[float, float]:

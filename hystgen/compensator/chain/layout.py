@@ -14,7 +14,7 @@ import numpy as np
 from hystgen.basics.jit import N
 from hystgen.basics.structures import Int64, Literal, Real, Struct, UInt8, note
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import noise, preview
+from hystgen.compensator.chain import moving, noise, preview
 from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
@@ -410,9 +410,17 @@ def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
     return math.fsum((np.array(pi.weights) * rows[:, 0]).tolist())
 
 
+def output_span(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, float]:
+    """Extremes of the sum of the plays and of elements in parallel with them, over all drive histories within the input
+    range. At the largest input so far z is 0, as after `settle`, or above, at most as large as after a full sweep."""
+    low, high = (settled(static, effects, end) for end in static.play_range)
+    more = math.fsum(float(np.maximum(each.weights, 0.0) @ each.most) for each in moving.parallel(static, effects))
+    return low - more, high + more
+
+
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
     """Extremes of the settled output over all drive histories within the input range."""
-    low, high = (settled(static, parts.plays, end) for end in static.play_range)
+    low, high = output_span(static, parts.plays)
     for one in parts.behind(seconds):
         low, high = one.at_rest(low), one.at_rest(high)
     for each in parts.maps:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import factor
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain.parts import BENDS, MOVES
+from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.fixed_tables import FixedCurve, reciprocal
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects import plays as at
@@ -45,6 +45,26 @@ def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None
     return [MOVES.of(effect, r, p) for effect in effects if effect.moves_plays()]
 
 
+def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.Parallel]:
+    """The elements in parallel with the plays, if an effect adds them."""
+    low, high = static.play_range
+    return [ELEMENTS.of(effect, high - low) for effect in effects if effect.joins_plays()]
+
+
+def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
+    """Largest magnitude of the sum of the elements in parallel with the plays."""
+    return math.fsum(float(np.abs(each.weights) @ each.most) for each in parallel(static, effects))
+
+
+def parallel_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, float]:
+    """Smallest and largest change of the sum of the elements per change of their input, over all histories."""
+    found = [each.weights * each.steepest for each in parallel(static, effects)]
+    return (
+        math.fsum(float(np.sum(np.minimum(each, 0.0))) for each in found),
+        math.fsum(float(np.sum(np.maximum(each, 0.0))) for each in found),
+    )
+
+
 @dataclass(frozen=True)
 class Bumps:
     """Contributions of bent plays minus the plays themselves, in fixed point: curves for integer inputs from -`end` to
@@ -69,6 +89,13 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     """The effects on plays that the C cannot invert at steps of `seconds`, each with its reason."""
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
+    joining = [effect for effect in effects if effect.joins_plays()]
+    if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
+        falling = -parallel_slopes(static, joining)[0]
+        what = f"right after a turn the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"
+        room = slope + falling
+        yield joining[0], what + (f"; divide negative weights by more than {falling / room:.3g}" if room > 0.0 else "")
+        return
     if not bending:
         return
     if not (slope := least_slope(static, bending[:1])) > 0.0:
@@ -95,13 +122,14 @@ def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float
     """Smallest change of the sum per change of the plays' input in one step, for thresholds that grow with the rate."""
     steep = 1.0 + steepest_bend(static, effects)
     falls = (mover.falling(seconds, steep) for mover in movers(static, effects))
-    return sum(falls, start=float(static.pi.weights[0]))
+    return sum(falls, start=float(static.pi.weights[0])) + parallel_slopes(static, effects)[0]
 
 
 def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
     """Smallest change of the sum per change of the plays' input, over their reach and any number of following plays."""
     p = np.array(static.pi.weights)
-    return float(np.min(np.cumsum(p[:, None] * _bends(static, effects)[1], axis=0)))
+    plays = float(np.min(np.cumsum(p[:, None] * _bends(static, effects)[1], axis=0)))
+    return plays + parallel_slopes(static, effects)[0]
 
 
 def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, Array]:
@@ -127,7 +155,7 @@ def slopes(static: StaticModel, effects: Sequence[Effect], seconds: float) -> tu
         if mover.moves(seconds) == at.DILATED:
             least = min(least, least_dilated(static, effects, seconds))
             drawn = drawn + mover.numbers(seconds, 1.0, 1.0).first
-    return least, float(p[0] + steep * (p[1:] @ drawn))
+    return least, float(p[0] + steep * (p[1:] @ drawn)) + parallel_slopes(static, effects)[1]
 
 
 def inverse_turns(least: float, most: float, unit: float) -> tuple[float, int]:
@@ -144,7 +172,8 @@ def sum_rounding(static: StaticModel, effects: Sequence[Effect], unit: float) ->
     low, high = static.play_range
     size = 3.0 * max(abs(low), abs(high)) + static.pi.thresholds[-1]
     bent = 1.0 + abs(steepest_bend(static, effects))
-    return (12.0 + len(static.pi.weights)) * unit * size * bent * float(np.sum(np.abs(static.pi.weights)))
+    elements = 24.0 * unit * largest_parallel(static, effects)
+    return (12.0 + len(static.pi.weights)) * unit * size * bent * float(np.sum(np.abs(static.pi.weights))) + elements
 
 
 def residual(static: StaticModel, effects: Sequence[Effect], unit: float) -> float:
@@ -257,7 +286,8 @@ def build(
             curve[1:] = rows
             number |= numbers
     halves = int(np.finfo(dtype).nmant) + 4
-    alone = not movers(static, effects) and not any(effect.bends_plays() for effect in effects)
+    joined = parallel(static, effects)
+    alone = not (joined or movers(static, effects) or any(effect.bends_plays() for effect in effects))
     turns = 0
     if not alone:
         unit = float(np.finfo(dtype).eps) / 2
@@ -266,15 +296,16 @@ def build(
         number["close"] = closeness(static, effects, ends, unit, turns, varies)
         if (room := number["close"] - sum_rounding(static, effects, unit)) > 0.0:  # a narrower interval is not needed
             halves = min(halves, math.ceil(math.log2(3.0 * (high - low) * ends[1] / room)))
-    alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
+    alike = kind == at.STRAIGHT and not joined and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
     given = (np.array(each, dtype=dtype) for each in (first, second, curve, share, inverse, yields))
     first, second, curve, share, inverse, yields = given
     constants = at.MovingNumbers.of([[number.get(name, 0.0) for name in at.MovingNumbers.members()]], dtype)
+    elements = joined[0].tables(dtype) if joined else at.ElementTables.none(dtype)
     return at.MovingTables(
-        moves, kind, first, second, curve, constants, halves, turns, int(scanned), share, inverse, yields
+        moves, kind, first, second, curve, constants, halves, turns, int(scanned), share, inverse, yields, elements
     )
 
 
@@ -341,10 +372,14 @@ def build_fixed(
     for mover in movers(static, effects):
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
+    unit = step * weight / int(plays.weight[0]) if weight > 0.0 else 0.0  # of the sum, output units
+    found = [each.coded(step, unit) for each in parallel(static, effects)]
+    elements = found[0] if found else at.FixedElementTables.none()
     return at.FixedMovingTables(
         own.moves, own.bends, own.scanned, first, second, farthest, near, max(32, 31 + near.bit_length()), relaxed,
         curves, np.array(bump.of, dtype=np.int64), bump.bits, at.FixedYield.of(rows), bits, stretch_end,
         np.array(factor(float(own.number.standing_share[0])), dtype=np.int64),
+        elements,
     )
 
 

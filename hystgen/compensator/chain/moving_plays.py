@@ -8,7 +8,7 @@ from hystgen.basics.jit import Scalar, jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
-from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Bending, Moves
+from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Bending, Elements, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
 from hystgen.plays.slots import Reals
 
@@ -21,15 +21,22 @@ class Kind(NamedTuple):
     solve: Function  # of plays, state and a sum: as engine loop
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
+    elements: Elements  # those in parallel with the plays
     search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
     begin: Function  # of state and weights: sets the slope or rate with which the first search begins
     ordered: Function  # of moving tables: whether a sum assumes that plays behind the first stationary one are too
 
 
+@jit(inline=True)
+def plain(m: Any) -> bool:
+    """Whether the loop engine solves for the plays: no effect moves, bends or joins them."""
+    return bool(m.moves == PLAIN and m.bends == STRAIGHT and len(m.elements.element) == 0)
+
+
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
     number."""
-    level, asked, solve, moves, (bent, steep), search, begin, ordered = kind
+    level, asked, solve, moves, (bent, steep), (joined, turn, unload), search, begin, ordered = kind
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
@@ -49,6 +56,9 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         for i in range(1, len(r)):
             z = moved(m, r, i, s.plays, s.lost, w) if s.own.moving[0] else resting(r, s.plays, i, w)
             total = total + p[i] * (s.bent[i] if z == play[i] else bent(m, plays, i, z))
+        if len(m.elements.element) > 0 and s.own.moving[0]:
+            more, _ = joined(m.elements, s.elements, w)
+            total = total + more
         return total
 
     @jit
@@ -72,7 +82,22 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
                     continue
                 follows = not ordered(m)
             total = total + p[i] * s.bent[i]
+        if len(m.elements.element) > 0 and s.own.moving[0]:
+            more, steeper = joined(m.elements, s.elements, w)
+            total = total + more
+            steady = steady + steeper
+            slope = slope + steeper
         return total, slope, steady
+
+    @jit
+    def elements_follow(m: Any, s: ChainState, w: Scalar, none: Any) -> Any:
+        """Move the elements in parallel with the plays while their input goes to w. Returns their sum."""
+        if len(m.elements.element) == 0:
+            return none
+        before = s.plays.play[0]
+        if w != before and (w > before) != (s.elements.upward[0] == 1):
+            turn(m.elements, s.elements, before)
+        return joined(m.elements, s.elements, w)[0]
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Scalar) -> Any:
@@ -103,8 +128,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_rest(t: ChainTables, s: ChainState, w: Scalar) -> Any:
-        """Bring the plays to rest with their input at w. Returns their sum."""
+        """Bring the plays to rest with their input at w. Returns their sum. In memory is set the slope, or in fixed
+        point the rate, with which a search begins."""
         m, plays, play = t.moving, t.plays, s.plays.play
+        if len(m.elements.element) > 0:
+            unload(m.elements, s.elements, w)
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         begin(s, p)
@@ -125,7 +153,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     def follow(t: ChainTables, s: ChainState, w: Scalar) -> Any:
         """Move the plays with their input w. Returns their sum."""
         m = t.moving
-        if m.moves == PLAIN and m.bends == STRAIGHT:
+        if plain(m):
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
         if m.scanned:
@@ -134,7 +162,8 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
         if s.own.moving[0]:
-            total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w)
+            joining = elements_follow(m, s, w, w - w)
+            total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w) + joining
             relax(m, t.plays, s.plays, s.bent)
             return level(t, total)
         return level(t, moved_rest(t, s, w))
@@ -143,7 +172,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     def started(t: ChainTables, s: ChainState) -> Any:
         """The sum of the plays in the start memory."""
         m = t.moving
-        if m.scanned or (m.moves == PLAIN and m.bends == STRAIGHT):
+        if m.scanned or plain(m):
             return level(t, loop_output(t.plays, s.plays))
         return level(t, moved_rest(t, s, s.plays.play[0]))
 
@@ -152,12 +181,15 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         """Input of the plays at which their sum is h."""
         m = t.moving
         total = asked(t, h)
-        if m.moves == PLAIN and m.bends == STRAIGHT:
+        if plain(m):
             return solve(t.plays, s.plays, total)
         if m.scanned:
             if s.own.moving[0]:
                 return relaxing_input(m, t.plays, s.plays, total)
             return solve(t.plays, s.plays, total)
+        here = s.plays.step.level[0]
+        if len(m.elements.element) > 0 and s.own.moving[0] and h != here and (h > here) != (s.elements.upward[0] == 1):
+            turn(m.elements, s.elements, s.plays.play[0])
         return searched(t, s, total)
 
     return start, follow, started, inverse_input

@@ -20,7 +20,7 @@ from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.maps import Map, MapPart
 from hystgen.effects.part import ChainPart
-from hystgen.effects.plays import Bending, Bent, Mover, Moves, PlaysPart
+from hystgen.effects.plays import Bending, Bent, ElementsPart, Mover, Moves, PlaysPart
 from hystgen.plays.slots import Counts
 
 
@@ -40,6 +40,10 @@ MOVES: PlaysPart[Mover, Moves]
 BENDS: PlaysPart[Bent, Bending]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
 """The effects that move plays, and those that bend them."""
+
+ELEMENTS: ElementsPart
+(ELEMENTS,) = (module.ELEMENTS for module in _MODULES if hasattr(module, "ELEMENTS"))
+"""The effect that adds elements in parallel with the plays."""
 
 MAPS: list[MapPart] = [module.MAPS for module in _MODULES if hasattr(module, "MAPS")]
 """Maps of the output at the very end of the chain."""

@@ -86,6 +86,7 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), rounding remainder of each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), contribution of each play, if an effect moves or bends plays
+    elements: Any  # memory of the elements in parallel with the plays
     blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
     line: PreviewLine
@@ -109,6 +110,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         loops._replace(play=loops.play[:0]) if corners else loops,
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
+        t.moving.elements.memory(),
         tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
         np.where([inverse and part.forward for part in parts], 0, t.counts),
         PreviewLine(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),

@@ -81,7 +81,7 @@ class Actuator(Ordered):
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
-        constant = np.zeros(rows.shape[1])
+        constant = self._joined(item) if self.joining else np.zeros(rows.shape[1])
         now = item.compared if self._needed <= _FILTERED else ALL
         whole = item.session or run
         for effect in self.at(Place.GAIN):
@@ -92,7 +92,7 @@ class Actuator(Ordered):
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR)[len(self.filters) :]:
             rows = effect.filtered(rows, run)
-            if self.at(Place.GAIN):  # without a gain the constant is zero
+            if self.joining or self.at(Place.GAIN):  # otherwise the constant is zero
                 constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
             rows, constant = item.picked(rows), constant[item.compared]
@@ -137,6 +137,19 @@ class Actuator(Ordered):
                 sums[by] = effect.filtered(total, item.run)
             total = sums[by]
         return total[item.compared] if self._needed == _FILTERED else total
+
+    def _joined(self, item: Item) -> Array:
+        """The terms in parallel with the plays, after the filters that follow, at the samples of `_slow`; cached."""
+
+        def make() -> Array:
+            course = self.course(item, item.y)
+            before = np.array(course.history or ())
+            total = self.parallel(np.concatenate([before, course.v]))[len(before) :]
+            for effect in self.filters:
+                total = effect.filtered(total, item.run)
+            return total[item.compared] if self._needed <= _FILTERED else total
+
+        return item.moved.kept((self._moving, self.joining, self.filters, self._needed <= _FILTERED), make)
 
     def _plays(self, item: Item) -> Array:
         """(n + 1, N) plays after the effects that bend them; the last few hypotheses are cached."""

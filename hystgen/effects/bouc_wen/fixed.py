@@ -1,0 +1,213 @@
+"""Elements in parallel with the plays, in fixed point.
+
+Places on the curve, in widths, and values of s = z/width have `UNIT` bits. On each piece the curve is `level + x m(h)`,
+with x from the begin of the piece, h = x over the length of the piece with 31 bits, and the mean slope m with `SLOPE`
+bits: changes of s are thus exact to 2^-28 of themselves, however short the move.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from hystgen.arithmetic.factors import factor, lifted, times
+from hystgen.basics.jit import jit
+from hystgen.effects.base import Array
+from hystgen.effects.bouc_wen.compensator import drifted
+from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements
+from hystgen.effects.bouc_wen.pieces import Pieces, pieces
+from hystgen.effects.plays import (
+    Elements,
+    ElementsState,
+    FixedElement,
+    FixedElementState,
+    FixedElementTables,
+    FixedPiece,
+)
+from hystgen.plays.slots import Reals
+
+UNIT, SLOPE, BACK = 44, 27, 28
+"""Bits of places and values, of slopes, which are at most 8, and of shares of a piece over shares of its rise."""
+
+DEGREE = 5
+"""Degree of the curve's polynomials."""
+
+ALLOWED = 2.0**-30
+"""Error allowed for the curve: about that of a slope with `SLOPE` bits over a quarter of a width."""
+
+FAR = 2**49
+"""[2^-44 widths] Largest distance: 32 widths, behind which the curve is level within `ALLOWED`, from any place."""
+
+
+@functools.cache
+def _pieces(exponent: float, balance: float) -> Pieces:
+    return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
+
+
+def of(effect: BoucWenElements | DahlElements, step: float, unit: float) -> FixedElementTables:
+    """Tables for inputs in steps of `step` and a sum in steps of `unit`. Raises OverflowError."""
+    found = _pieces(*effect.law)
+    wide = np.diff(found.begin)
+    scale = UNIT - 32 + np.frexp(wide)[1]  # lengths are powers of 2
+    powers = np.arange(DEGREE)
+    up = np.rint(np.ldexp(found.up * wide[:, None] ** powers, SLOPE)).astype(np.int64)
+    rise = np.diff(found.level)
+    back = np.rint(
+        np.ldexp(found.back * rise[:, None] ** (powers + 1) / wide[:, None], BACK)
+    ).astype(np.int64)
+    if max(np.max(np.sum(np.abs(up), axis=1)), np.max(np.sum(np.abs(back), axis=1))) >= 2**31 - DEGREE:
+        raise OverflowError("the curve is too steep")
+    lift = [max(0, -math.frexp(each)[1]) for each in rise.tolist()]
+    share = [factor(2.0 ** (31 - UNIT - more) / each) for each, more in zip(rise.tolist(), lift, strict=True)]
+
+    def scaled(values: Array) -> tuple[list[tuple[int, int]], list[int]]:
+        lifts = [lifted(each, 0) for each in values.tolist()]
+        return [factor(each / 2.0**more) for each, more in zip(values.tolist(), lifts, strict=True)], lifts
+
+    weights, widths = np.array(effect.weights), np.array(effect.widths)
+    ratio = 2.0**UNIT * step / widths
+    distance, distance_lift = scaled(ratio)
+    amplitude, amplitude_lift = scaled(weights * widths / unit / 2.0**UNIT)
+    begin, level = (np.rint(np.ldexp(each, UNIT)).astype(np.int64).tolist() for each in (found.begin, found.level))
+    far = np.minimum(np.floor(FAR / ratio), 2**40).astype(np.int64).tolist()
+    level_on = [[0] * DEGREE]  # behind the last piece
+    pieces_of = zip(
+        begin, level, [*share, (0, 21)], [*up.tolist(), *level_on], [*back.tolist(), *level_on],
+        [*scale.tolist(), 0], [*lift, 0], strict=True,
+    )
+    elements = zip(distance, amplitude, far, distance_lift, amplitude_lift, strict=True)
+    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements))
+
+
+def error(effect: BoucWenElements | DahlElements) -> float:
+    """Bound on the error of the sum of the elements, output units."""
+    found = _pieces(*effect.law)
+    size = float(np.abs(effect.weights) @ np.array(effect.widths))
+    rounded = 2.0**-SLOPE * DEGREE
+    return size * drifted(effect.law[0], found.error + rounded, found.slip + 2.0 * rounded)
+
+
+# ---------------------------------------------------------------- elements.c
+
+
+@jit
+def piece_at(begins: Reals, x: int) -> int:
+    """The piece in which a place or a value of the curve lies, given where pieces begin."""
+    low = 0
+    high = len(begins)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < begins[middle]:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@jit
+def share_of(x: int, scale: int) -> int:
+    """A distance x >= 0 from the begin of a piece, over its length, with 31 bits."""
+    return min(x >> scale, 2**31 - 1)
+
+
+@jit
+def part(y: int, h: int) -> int:
+    """y times h = 0 .. 1 with 31 bits."""
+    return (y * h + 2**30) >> 31
+
+
+@jit
+def distance(t: FixedElementTables, j: int, way: int) -> int:
+    """A move of the input in widths of element j."""
+    far = t.element.far[j]
+    inside = min(max(way, -far), far)
+    return times(inside, t.element.distance.mantissa[j], t.element.distance.shift[j]) << t.element.distance_lift[j]
+
+
+@jit
+def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x: int) -> int:
+    """Change of s of element j over the distance x since its last turn; backwards the curve goes on straight."""
+    n = m.element.c.shape[1]
+    if x < 0:
+        return times(x, m.element.c[j, 0], SLOPE)
+    if x < m.element.until[j]:
+        h = share_of(x, m.element.scale[j])
+        slope = m.element.c[j, n - 1]
+        for k in range(n - 2, -1, -1):
+            slope = m.element.c[j, k] + part(slope, h)
+        return times(x, slope, SLOPE)
+    i = piece_at(t.piece.begin, m.element.place[j] + x)
+    on = m.element.place[j] + x - t.piece.begin[i]
+    if i == len(t.piece) - 1:
+        return t.piece.level[i] - m.element.level[j]
+    h = share_of(on, t.piece.scale[i])
+    slope = t.piece.up[i, n - 1]
+    for k in range(n - 2, -1, -1):
+        slope = t.piece.up[i, k] + part(slope, h)
+    return t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j]
+
+
+@jit
+def put(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, s: int) -> None:
+    """Put element j at the value s of the curve."""
+    n = m.element.c.shape[1]
+    last = len(t.piece) - 1
+    i = piece_at(t.piece.level, s)
+    g = times((s - t.piece.level[i]) << t.piece.lift[i], t.piece.share.mantissa[i], t.piece.share.shift[i])
+    g = min(g, 2**31 - 1)
+    slope = t.piece.back[i, n - 1]
+    for k in range(n - 2, -1, -1):
+        slope = t.piece.back[i, k] + part(slope, g)
+    h = min(max((slope * g + 2 ** (BACK - 1)) >> BACK, 0), 2**31 - 1)
+    x = h << t.piece.scale[i]
+    for k in range(n):
+        m.element.c[j, k] = t.piece.up[i, k]
+    for k in range(n - 1, 0, -1):  # the slope at h, then the other coefficients
+        m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
+    m.element.level[j] = t.piece.level[i] + times(x, m.element.c[j, 0], SLOPE)
+    for first in range(1, n):
+        for k in range(n - 1, first - 1, -1):
+            m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
+    m.element.place[j] = t.piece.begin[i] + x
+    m.element.scale[j] = t.piece.scale[i]
+    m.element.until[j] = t.piece.begin[i + 1] - m.element.place[j] if i < last else 0
+
+
+@jit
+def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
+    """Bring every element to rest at z = 0, with its input at w."""
+    m.turned[0] = w
+    m.upward[0] = 1
+    for j in range(len(t.element)):
+        m.element.s[j] = 0
+        put(t, m, j, 0)
+
+
+@jit
+def turn(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
+    """Turn every element at the input w: its s changes sign."""
+    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
+    last = t.piece.level[len(t.piece) - 1]
+    for j in range(len(t.element)):
+        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))
+        m.element.s[j] = -min(max(s, -last), last)
+        put(t, m, j, m.element.s[j])
+    m.turned[0] = w
+    m.upward[0] = 1 - m.upward[0]
+
+
+@jit
+def joined(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> tuple[int, int]:
+    """The sum of the elements with their input at w."""
+    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
+    total = 0
+    for j in range(len(t.element)):
+        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))
+        size = t.element.amplitude
+        total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
+    return (total if m.upward[0] else -total), 0
+
+
+ARITHMETIC = Elements(joined, turn, unload)

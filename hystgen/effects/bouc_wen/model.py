@@ -1,0 +1,213 @@
+"""Elements in parallel with the plays whose minor loops stay open: Bouc-Wen and Dahl."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.jit import jit
+from hystgen.basics.quantities import Number, Positive
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, not_as_many
+from hystgen.effects.bouc_wen.curve import Half, distance, halves, size
+
+MOST_ELEMENTS = 3
+"""Maximum number of elements: records determine one, rarely two (`candidates`)."""
+
+LARGEST_EXPONENT = 10.0
+"""Largest exponent: at 10 an element's knee is sharper than the spacing of most models' plays, which then describe it
+as well. Fits in the literature lie between 1 and 3."""
+
+LEAST_BALANCE, LARGEST_BALANCE = 0.5, 4.0
+"""Smallest and largest balance. Below 1/2 an element would return more work than it took in (beta < gamma in Wen's
+notation; Ikhouane, Rodellar, Systems with Hysteresis, 2007); from 1/2 on, |z| <= width, and errors of z never grow.
+Fits in the literature have gamma >= -beta/2, or a balance of at most 2."""
+
+WEIGHT = 5.0
+"""[mean slopes of the records] Largest magnitude of a weight tried: friction of five times the stage's stiffness has no
+inverse."""
+
+WITHIN = 0.01, 1.0
+"""[fractions of the drive range] Smallest and largest width: below, an element acts like plays with the smallest
+thresholds; above, like a straight line and a memory of the start."""
+
+BALANCES, EXPONENTS = (0.51, 3.0), (1.0, 5.0)
+"""Smallest and largest values tried, inside those that a file may give: a search may step beyond them by a little."""
+
+STARTS = 5
+"""Number of widths from which a search starts, each about three times the previous one."""
+
+DAHL = "bouc_wen, dahl"
+
+
+@jit
+def reach(above: Half, below: Half, place: float) -> float:
+    """s at a place of the curve, -1 to 1."""
+    if place < 0.0:
+        return max(-size(below, -place), -1.0)
+    return min(size(above, place), 1.0)
+
+
+@jit
+def place_of(above: Half, below: Half, s: float) -> float:
+    """The place of the curve at which it has the value s."""
+    return -distance(below, -s) if s < 0.0 else distance(above, s)
+
+
+@jit
+def element(w: Array, width: float, weight: float, above: Half, below: Half, total: Array) -> None:
+    """Add `weight z` to `total`, for the input `w`, from z = 0 at its first sample.
+
+    Between turns the place on the curve is that of the last turn plus the distance from there, so that no rounding
+    errors accumulate over the samples.
+    """
+    way, turned, begin = 1.0, w[0], 0.0
+    for k in range(1, len(w)):
+        move = w[k] - w[k - 1]
+        if way * move < 0.0:
+            s = reach(above, below, begin + way * (w[k - 1] - turned) / width)
+            begin, turned, way = place_of(above, below, -s), w[k - 1], -way
+        total[k] += weight * width * way * reach(above, below, begin + way * (w[k] - turned) / width)
+
+
+class _ParallelElements(Effect):
+    name: Literal["bouc_wen"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.PLAYS
+    shown_by: ClassVar[Mapping[str, int]] = {"slow_minor": 1, "slow_reversals": 3, "reversals": 3, "fast_minor": 4}
+    order: ClassVar[int] = 2
+    timed: ClassVar[bool] = False
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact: one equation per sample is solved"
+
+    weights: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
+        description="k_j, output per input unit of the plays, of either sign", examples=[[-0.2]]
+    )
+    widths: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
+        description="as many as weights, largest |z_j|, input units of the plays", examples=[[5.0]]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """A problem unless there is one width for each weight."""
+        yield from not_as_many("widths", self.widths, "weights", self.weights)
+
+    @property
+    @abstractmethod
+    def law(self) -> tuple[float, float]:
+        """Exponent and balance."""
+
+    def parallel(self, w: Array) -> Array:
+        """`sum k_j z_j` (N,), from z_j = 0 at the first sample."""
+        total = np.zeros(len(w))
+        for weight, width in zip(self.weights, self.widths, strict=True):
+            element(np.ascontiguousarray(w), width, weight, *halves(*self.law), total)
+        return total
+
+
+class BoucWenElements(_ParallelElements):
+    """Bouc-Wen elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, z_j in units of the plays' input w.
+
+        dz = dw (1 - (b sgn(z dw) + 1 - b) |z/width|^n)
+
+    Wen's equation with `beta + gamma = 1`, `b = beta` (Y. K. Wen, Method for random vibration of hysteretic systems, J.
+    Eng. Mech. Div. ASCE 102, 1976). With a positive weight the output leads its input, with a negative one it lags.
+    """
+
+    shape: Literal["bouc_wen"] = Field(default="bouc_wen", description="Wen's law")
+    exponent: Annotated[float, Field(ge=1.0, le=LARGEST_EXPONENT)] = Field(
+        default=1.0, description="n, sharpness of the transition from the straight line to the limit"
+    )
+    balance: Annotated[float, Field(ge=LEAST_BALANCE, le=LARGEST_BALANCE)] = Field(
+        default=1.0, description="b, difference between loading and unloading; at 0.5, unloading is straight"
+    )
+
+    @property
+    def law(self) -> tuple[float, float]:
+        """Exponent and balance."""
+        return self.exponent, self.balance
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One element with any balance, then with any exponent as well; tried if Dahl's element helps."""
+
+        def build(x: Array) -> BoucWenElements:
+            weights, widths = _elements(x[None, :2], about)
+            exponent = float(np.clip(x[3], 1.0, LARGEST_EXPONENT)) if len(x) > 3 else 1.0
+            balance = float(np.clip(10.0 ** x[2], LEAST_BALANCE, LARGEST_BALANCE))
+            return cls(name="bouc_wen", weights=weights, widths=widths, exponent=exponent, balance=balance)
+
+        more = np.array([[*np.log10(BALANCES), 0.0], [*EXPONENTS, 1.0]])
+
+        def freed(label: str, count: int) -> Candidate:
+            straight = _candidate(label, 1, build, more[:count])
+            return replace(straight, beyond=DAHL, grown=lambda x: np.append(x, more[:count, 2]))
+
+        return [freed("bouc_wen, any balance", 1), freed("bouc_wen, any balance and exponent", 2)]
+
+
+class DahlElements(_ParallelElements):
+    """Dahl's friction elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, `dz = dw (1 - sgn(dw) z/width)`.
+
+    The Bouc-Wen element with exponent and balance 1 (P. R. Dahl, A solid friction model, Aerospace Corporation, 1968).
+    """
+
+    shape: Literal["dahl"] = Field(description="Dahl's law: exponent 1 and balance 1")
+
+    @property
+    def law(self) -> tuple[float, float]:
+        """Exponent and balance."""
+        return 1.0, 1.0
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One element, and two if one helps."""
+
+        def build(x: Array) -> DahlElements:
+            weights, widths = _elements(x.reshape(-1, 2), about)
+            return cls(name="bouc_wen", shape="dahl", weights=weights, widths=widths)
+
+        def grown(x: Array) -> Array:
+            one, other = np.clip(x[1] + np.array([-0.3, 0.3]), *np.log10(WITHIN))
+            return np.array([0.5 * x[0], one, 0.5 * x[0], other])
+
+        none = np.empty((0, 3))
+        return [
+            _candidate(DAHL, 1, build, none),
+            replace(_candidate("bouc_wen, two dahl", 2, build, none), beyond=DAHL, grown=grown),
+        ]
+
+
+def _elements(x: Array, about: About) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Weights and widths from a fit's coordinates (k, 2): mean slopes, and decimal logarithms of drive ranges."""
+    wide = about.drive[1] - about.drive[0]
+    return tuple((about.output_range / wide * x[:, 0]).tolist()), tuple((wide * 10.0 ** x[:, 1]).tolist())
+
+
+def _candidate(label: str, count: int, build: Callable[[Array], Effect], more: Array) -> Candidate:
+    """A shape with `count` elements, and parameters with the bounds and starts `more` (k, 3)."""
+    low, high = np.log10(WITHIN)
+
+    def start(place: float) -> Array:
+        # several elements start apart, as equal ones would stay equal
+        places = np.clip(place + 0.5 * (np.arange(count) - 0.5 * (count - 1)), low, high)
+        return np.concatenate([np.stack([np.zeros(count), places], axis=1).ravel(), more[:, 2]])
+
+    starts = [start(place) for place in np.linspace(low, high, STARTS)]
+    return Candidate(
+        label,
+        np.concatenate([np.tile([-WEIGHT, low], count), more[:, 0]]),
+        np.concatenate([np.tile([WEIGHT, high], count), more[:, 1]]),
+        starts[0], build, starts[0], tuple(starts[1:]), amounts=tuple(range(0, 2 * count, 2)),
+    )
+
+
+SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements)
+
+
+def load() -> None:
+    """Compile the elements, or load them from the cache, by running them on two samples."""
+    element(np.array([0.0, 1.0]), 1.0, 1.0, *halves(1.0, 1.0), np.zeros(2))

@@ -1,0 +1,208 @@
+"""Elements in parallel with the plays: against their equation, and against plants that share nothing with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hystgen
+from hystgen import plants
+from hystgen.basics.problems import ParameterError
+from hystgen.cascade import PI, Cascade
+from hystgen.chain.chain import Chain
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search.hypothesis import Actuator
+from hystgen.effects import About, Effect, Run, shapes
+from hystgen.effects.bouc_wen.curve import distance, halves, size
+
+Array = NDArray[np.float64]
+
+LAWS = [(1.0, 1.0), (1.0, 0.5), (1.0, 2.0), (1.1, 0.7), (1.5, 4.0), (2.0, 1.0), (2.7, 1.43), (5.5, 0.6), (10.0, 4.0)]
+law = pytest.mark.parametrize(("exponent", "balance"), LAWS)
+
+THRESHOLDS, WEIGHTS = (0.0, 0.45, 0.9), (0.72, 0.6, 0.48)
+
+
+def make(**keys: Any) -> Effect:
+    """An effect built from its keys in a parameter file."""
+    return shapes("bouc_wen")["shape" in keys].model_validate({"name": "bouc_wen", **keys})
+
+
+def wave(n: int, seed: int, size: float = 2.0) -> Array:
+    """A smooth drive of random amplitude and bias with about 20 reversals, at 0 first."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, n)
+    parts = [rng.normal() * (np.sin(2 * np.pi * (f * t + a)) - np.sin(2 * np.pi * a))
+             for f, a in zip((0.6, 2.1, 5.3, 9.7), rng.uniform(size=4), strict=True)]
+    return np.asarray(size * np.sum(parts, axis=0))
+
+
+def integrated(w: Array, width: float, exponent: float, balance: float, parts: int) -> Array:
+    """z at the inputs `w`, by the classical Runge-Kutta method with `parts` steps from each input to the next."""
+
+    def slope(z: float, sign: float) -> float:
+        return 1.0 - (balance * np.sign(z * sign) + 1.0 - balance) * abs(z / width) ** exponent
+
+    z, found = 0.0, [0.0]
+    for move in np.diff(w).tolist():
+        h, sign = move / parts, float(np.sign(move))
+        for _ in range(parts if move else 0):
+            a = slope(z, sign)
+            b = slope(z + 0.5 * h * a, sign)
+            c = slope(z + 0.5 * h * b, sign)
+            d = slope(z + h * c, sign)
+            z += h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        found.append(z)
+    return np.array(found)
+
+
+@law
+def test_the_curve_is_its_equation(exponent: float, balance: float) -> None:
+    """`d = int dm/(1 - c m^n)`, by quadrature in `m^(1/6)`, in which the integrand is smooth at 0 for all exponents."""
+    for half, c in zip(halves(exponent, balance), (1.0, 1.0 - 2.0 * balance), strict=True):
+        m = np.concatenate([np.linspace(0.0, 0.98, 50), 1.0 - np.logspace(-2, -12, 11), [1.0] if c <= 0.0 else []])
+        u = m ** (1.0 / 6.0)
+        places, shares = np.polynomial.legendre.leggauss(40)
+        v = 0.5 * (u[1:, None] + u[:-1, None] + np.diff(u)[:, None] * places)
+        pieces = 0.5 * np.diff(u) * ((6.0 * v**5 / (1.0 - c * v ** (6.0 * exponent))) @ shares)
+        d = np.concatenate([[0.0], np.cumsum(pieces)])
+        assert np.max(np.abs(np.array([size(half, x) for x in d]) - m)) < 2e-14
+        back = np.array([distance(half, x) for x in m])
+        assert np.max(np.abs(back - d) * (1.0 - c * m**exponent)) < 2e-14
+
+
+@law
+def test_an_element_is_its_equation(exponent: float, balance: float) -> None:
+    """The error of the integration is the difference between two of its step sizes, of which the finer is used."""
+    w, width = wave(301, 3), 0.8
+    found = make(weights=(1.0,), widths=(width,), exponent=exponent, balance=balance).parallel(w)
+    fine, coarse = (integrated(w, width, exponent, balance, parts) for parts in (100, 50))
+    assert np.max(np.abs(found - fine)) < 2.0 * np.max(np.abs(fine - coarse)) + 1e-13
+    assert np.max(np.abs(fine - coarse)) < 2e-5
+    assert np.max(np.abs(found)) <= width
+
+
+@pytest.mark.parametrize(("beta", "gamma", "n"), [(0.5, 0.5, 1.0), (0.6, -0.3, 1.0), (0.6, 0.3, 2.0), (0.4, -0.2, 2.0)])
+def test_a_bouc_wen_plant_is_an_element(beta: float, gamma: float, n: float) -> None:
+    """`D dz/dv = 1 - (beta sgn + gamma) |z|^n` in the plant's units; the element's has `|z| <= width`."""
+    alpha, k, scale = 1.6, 0.1, 0.7
+    v = wave(4000, 5)
+    plant = plants.BoucWen(alpha=alpha, k=k, D=scale, beta=beta, gamma=gamma, n=n)
+    width = scale * (beta + gamma) ** (-1.0 / n)
+    effect = make(weights=((1.0 - alpha) * k,), widths=(width,), exponent=n, balance=beta / (beta + gamma))
+    found = Chain(Cascade(PI([0.0], [alpha * k])), [effect]).output(Run(np.arange(len(v)) * 1e-3, v))
+    assert np.max(np.abs(found - plant.simulate(v))) < 1e-12
+
+
+def test_a_dahl_plant_is_an_element() -> None:
+    """Dahl's force rises with slope `sigma` from 0 to `limit`."""
+    plant = plants.Dahl(limit=0.6, sigma=1.5)
+    v = wave(4000, 6)
+    found = make(shape="dahl", weights=(1.5,), widths=(0.4,)).parallel(v)
+    assert np.max(np.abs(found - plant.simulate(v))) < 1e-12
+
+
+def test_dahl_is_bouc_wen_with_exponent_and_balance_1() -> None:
+    w = wave(500, 7)
+    keys = {"weights": (0.3, -0.1), "widths": (0.5, 2.0)}
+    assert np.array_equal(make(**keys).parallel(w), make(shape="dahl", **keys).parallel(w))
+
+
+@law
+def test_many_small_reversals_leave_no_error_behind(exponent: float, balance: float) -> None:
+    """A dithered rest: exact moves of one last bit either way change z by as much, and nothing accumulates.
+
+    From z = 0.3 width, each pair of moves d reduces s by `d (2 b s^n)/width`, to first order in d.
+    """
+    pairs, d, width = 200_000, 1e-9, 1.0
+    w = np.concatenate([np.linspace(0.0, 0.3, 50), np.tile([0.3 + d, 0.3], pairs)])
+    z = make(weights=(1.0,), widths=(width,), exponent=exponent, balance=balance).parallel(w)
+    s = z[49] / width
+    moved = pairs * d * 2.0 * balance * s**exponent
+    assert abs(z[49] - z[-1] - moved) < 1e-3 * moved + pairs * d * d + 1e-11
+
+
+def test_the_sum_goes_through_what_follows_the_plays() -> None:
+    """Creep, gains and modes see the sum of plays and elements: linear parts of the chain act on each alone."""
+    v = wave(2000, 8)
+    run = Run(np.arange(len(v)) * 1e-3, v, {"temperature": 20.0 + np.sin(np.arange(len(v)) * 0.01)})
+    effect = make(weights=(-0.2, 0.3), widths=(0.7, 1.4), exponent=2.0, balance=0.7)
+    creep = shapes("creep")[0].model_validate({"name": "creep", "time_constants": (0.02, 0.3), "weights": (0.05, 0.1)})
+    thermal = shapes("thermal")[0].model_validate({"name": "thermal", "gain_per_degree": 0.01, "reference": 19.0})
+    plays = Cascade(PI(THRESHOLDS, WEIGHTS), (), 0.3)
+    together = Chain(plays, [thermal, effect, creep]).output(run)
+    alone = Chain(plays, [thermal, creep]).output(run)
+    extra = thermal.gain(run) * creep.filtered(effect.parallel(v), run)
+    assert np.max(np.abs(together - alone - extra)) < 1e-13
+    assert np.max(np.abs(extra)) > 0.1
+
+
+BEHIND: dict[str, dict[str, Any]] = {
+    "creep": {"time_constants": (0.02,), "weights": (0.1,)}, "resonance": {"frequency": 40.0, "damping": 0.1},
+    "thermal": {"gain_per_degree": 0.01, "reference": 19.0}, "saturation": {"level": 4.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("others", "history"),
+    [
+        ((), None), (("creep",), None), (("creep", "resonance"), ()), (("thermal", "resonance"), ()),
+        (("saturation",), ()), ((), (1.5, -0.7)), (("saturation",), (1.5, -0.7)),
+    ],
+)
+def test_a_hypothesis_is_the_chain(others: tuple[str, ...], history: tuple[float, ...] | None) -> None:
+    """The diagnosis predicts what the chain simulates after the same history, up to an offset."""
+    effects = [make(weights=(-0.2,), widths=(0.7,), exponent=1.7)]
+    effects += [shapes(name)[0].model_validate({"name": name, **BEHIND[name]}) for name in others]
+    v = np.concatenate([history or (), wave(800, 9)])
+    warm = {"temperature": np.full(len(v), 21.0)}
+    whole = Run(np.arange(len(v)) * 1e-3, v, warm)
+    run = whole.picked(np.arange(len(history or ()), len(v)))
+    run = Run(run.t, run.v, dict(run.extra))
+    y = Chain(Cascade(PI(THRESHOLDS, WEIGHTS)), effects).output(whole)[-len(run.t) :]
+    actuator = Actuator(np.array(THRESHOLDS), (), tuple(effects))
+    for weights in (None, np.array(WEIGHTS)):
+        rows, constant = actuator.columns(Item("a record", run, y, history, 1.0), weights)
+        found = (np.array(WEIGHTS) @ rows if weights is None else rows[0]) + constant
+        assert np.ptp(actuator.mapped(found, 0.0, run) - y) < 1e-12
+
+
+def test_candidates_are_effects_and_contain_none() -> None:
+    about = About((-1.0, 4.0), 8.0, 1e-3, 2.0, 2.0, 50.0, 30.0, THRESHOLDS)
+    found = [each for kind in shapes("bouc_wen") for each in kind.candidates(about)]
+    assert len({each.label for each in found}) == len(found) == 4
+    w = wave(300, 2)
+    for each in found:
+        for x in (each.low, each.high, each.start, *each.others):
+            assert np.all(np.abs(each.build(x).parallel(w)) <= 3 * 2 * 5.0 * 8.0)
+        assert each.none is not None
+        assert not np.any(each.build(each.none).parallel(w))
+        widths = {tuple(each.build(x).model_dump()["widths"]) for x in (each.start, *each.others)}
+        assert len(widths) == 5
+
+
+REFUSED = {
+    "weights: [1], widths: [1, 2]": "widths: has 2 values for 1 in weights; give as many as weights",
+    "weights: [1, 1, 1, 1], widths: [1, 1, 1, 1]": "weights: has 4 values, more than 3; shorten the list",
+    "weights: [1], widths: [0]": "widths[0]: must be above 0",
+    "weights: [1], widths: [1], exponent: 0.9": "exponent: must be at least 1",
+    "weights: [1], widths: [1], exponent: 11": "exponent: must be at most 10",
+    "weights: [1], widths: [1], balance: 0.4": "balance: must be at least 0.5",
+    "weights: [1], widths: [1], balance: 5": "balance: must be at most 4",
+    "shape: dahl, weights: [1], widths: [1], exponent: 1": "exponent: unknown key",
+    "shape: dahl, weights: [1]": "widths: is missing",
+}
+
+
+@pytest.mark.parametrize("keys", REFUSED)
+def test_wrong_keys_are_refused(keys: str, tmp_path: Path) -> None:
+    head = "hystgen: 1\nname: x\ninput_range: [0, 1]\nmodel:\n  pi: {thresholds: [0], weights: [1]}\n"
+    path = tmp_path / "x.yaml"
+    path.write_text(f"{head}  effects: [{{name: bouc_wen, {keys}}}]\n")
+    with pytest.raises(ParameterError) as caught:
+        hystgen.load(path)
+    assert f"model.effects[0].{REFUSED[keys]}" in str(caught.value)
