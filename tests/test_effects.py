@@ -16,7 +16,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import integrate, interpolate, signal, special
@@ -1390,3 +1390,21 @@ def test_show_says_how_the_inverse_reads_the_reference(
         assert (code, err) == (0, "")
         assert f"compensation: {said}" in out
         assert out.splitlines()[-1].startswith(last)
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.floats(1e-30, 1e6), st.floats(-1e6, 1e6), st.floats(1e-9, 1e3), st.floats(1e-9, 1e3),
+    st.sampled_from([1.0, 1.25, 2.0, 3.0]), st.floats(1e-3, 1e3),
+)
+@example(4.900758611054568, 2.2482751908462538e-20, 1.0, 0.00011925250598222254, 1.0, 1.0)  # rounds to below zero
+@example(5.0, -1e-300, 1.0, 1e-3, 1.0, 1.0)
+def test_a_stretch_ends_at_or_above_zero(
+    e: float, speed: float, duration: float, tau: float, exponent: float, scale: float
+) -> None:
+    """As compiled functions and as Python, which refuses logarithms and powers that compiled code lets pass."""
+    for function in (rate_dependence.stretch, rate_dependence.stretch.interpreted):
+        after, left = function(e, speed, duration, tau, exponent, scale)
+        assert 0.0 <= after <= e + abs(speed) * duration + 1e-9 * scale
+        assert 0.0 <= left <= duration
+        assert speed < 0.0 or left == 0.0

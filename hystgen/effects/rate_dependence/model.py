@@ -119,8 +119,8 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
     """
     if exponent == 1.0:
         final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
-        if final > 0.0 or (final == 0.0 and speed >= 0.0):
-            return final, 0.0
+        if final > 0.0 or speed >= 0.0:  # a slow rise may round to below zero
+            return max(final, 0.0), 0.0
         taken = tau * math.log1p(e / (-speed * tau))
         return 0.0, duration - taken if taken < duration else 0.0
     left = duration
@@ -176,7 +176,8 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
             step *= max(0.2, 0.9 * (CLOSE * scale / wrong) ** (1.0 / 3.0))
             continue
         if final < 0.0:
-            taken = -math.log1p(slope * e / change) / slope if part > 1e-8 else -e / change
+            share = slope * e / change
+            taken = -e / change if part <= 1e-8 else -math.log1p(share) / slope if share > -1.0 else step
             return 0.0, max(left - min(taken, step), 0.0)
         e = final
         left -= step
