@@ -103,6 +103,39 @@ typedef struct {
     uint8_t tries; /* by secants */
 } hystgen_search_t;
 
+/* A piece of the curve of elements in parallel with the plays: its begin and the curve's value
+   there, both with 44 bits, coefficients of the mean slope from there on, and of the inverse over
+   the share of the piece's rise. */
+typedef struct {
+    int64_t begin;
+    int64_t level;
+    hystgen_factor_t share;
+    int32_t up[5];
+    int32_t back[5];
+    uint8_t scale; /* right shift from a distance to the share of the length in units of 2^-31 */
+    uint8_t lift;  /* bits of a value that the product with `share` needs in addition */
+} hystgen_piece_t;
+
+/* An element: factors from a move of the input, of at most `far`, to a distance on the curve, and
+   from there to the sum, without the bits that their products leave out. */
+typedef struct {
+    hystgen_factor_t distance;
+    hystgen_factor_t amplitude;
+    int64_t far;
+    uint8_t distance_lift;
+    uint8_t amplitude_lift;
+} hystgen_element_table_t;
+
+/* An element in parallel with the plays, at the last turn of its input. */
+typedef struct {
+    int64_t s;     /* z/width in the direction of the input, */
+    int64_t place; /* on the curve, */
+    int64_t level; /* the curve's value there, */
+    int64_t until; /* the distance to the end of its piece, */
+    int32_t c[5];  /* the coefficients of its mean slope from there on, */
+    uint8_t scale; /* and the right shift to the share of the piece's length */
+} hystgen_element_t;
+
 /* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */
 typedef struct {
     hystgen_factor_t rate;
@@ -142,6 +175,16 @@ typedef struct {
 typedef struct {
     hystgen_real_t slope; /* change in their sum per unit change in their input, in steady motion */
 } hystgen_search_t;
+
+/* An element in parallel with the plays, at the last turn of its input. */
+typedef struct {
+    hystgen_real_t high;  /* z/width in the direction of the input, */
+    hystgen_real_t low;   /* and its rounding remainder */
+    hystgen_real_t place; /* on the curve, */
+    hystgen_real_t level; /* the curve's value there, */
+    hystgen_real_t until; /* the distance to the end of its piece, */
+    hystgen_real_t c[7];  /* and its coefficients from there on */
+} hystgen_element_t;
 
 /* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */
 typedef struct {
