@@ -74,8 +74,8 @@ class FixedElementTables(NamedTuple):
     bits, the right shift `scale` from a distance to its share of the length with 31 bits, coefficients `up` (K + 1, D)
     of the mean slope, and of the inverse `back` (K + 1, D) over the `share` (K + 1, 2) of the piece's rise, a factor of
     a value with `lift` more bits. Of each element (k,): a `weight` of 1, the factor `distance` (k, 2) from a move to
-    widths, `far`, the largest move that counts, and the factor `amplitude` (k, 2) from s to the sum, both products with
-    lower bits left out."""
+    widths, `far`, the largest move that counts, and the factor `amplitude` (k, 2) from s to the sum, with left shifts
+    of the argument of the first and of the product of the second."""
 
     begin: Reals
     level: Reals
@@ -292,7 +292,7 @@ class PlaysPart(Generic[T, F]):
     coded: Callable[[], F]
 
 
-class Parallel(NamedTuple):
+class ParallelTerms(NamedTuple):
     """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
     input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
     error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
@@ -322,6 +322,6 @@ class ElementsPart:
     """An effect in parallel with the plays: `of` describes it, from the effect and the span of its input; `floating`:
     its functions; `coded` loads them in fixed point."""
 
-    of: Callable[..., Parallel]
+    of: Callable[..., ParallelTerms]
     floating: Elements
     coded: Callable[[], Elements]
