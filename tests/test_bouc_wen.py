@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from modelfiles import BRANCHES, CREEP, TANH, chain
 from numpy.typing import NDArray
 
 import hystgen
 from hystgen import plants
+from hystgen.basics import jit
 from hystgen.basics.problems import ParameterError
 from hystgen.cascade import PI, Cascade
 from hystgen.chain.chain import Chain
@@ -18,6 +20,8 @@ from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects import About, Effect, Run, shapes
 from hystgen.effects.bouc_wen.curve import distance, halves, size
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 
 Array = NDArray[np.float64]
 
@@ -206,3 +210,97 @@ def test_wrong_keys_are_refused(keys: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError) as caught:
         hystgen.load(path)
     assert f"model.effects[0].{REFUSED[keys]}" in str(caught.value)
+
+
+# In the C ----------------------------------------------------------------------------------------------------
+
+ARITHMETICS = ("float32", "float64", "q31", "q15")
+
+TWO = "name: bouc_wen, weights: [-0.2, 0.1], widths: [2, 0.7], exponent: 1.6, balance: 1.3"
+DAHL = "name: bouc_wen, shape: dahl, weights: [-0.15], widths: [1]"
+SOFT = "name: bouc_wen, weights: [3], widths: [0.5], exponent: 2"
+
+COMBINED = {
+    "alone": (TWO,),
+    "soft": (SOFT,),
+    "dilated": (DAHL, "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]"),
+    "dashpot": (TWO, "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5"),
+    "relaxing": (DAHL, "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3"),
+    "polynomials": (TWO, "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
+    "lagged": (DAHL, "name: lag, time_constant: 0.01", CREEP, "name: slew_limit, rate: 3000"),
+    "late": (TWO, "name: delay, time: 2.6e-3", "name: resonance, frequency: 40, damping: 0.3",
+             "name: saturation, level: 12"),
+    "warm": (DAHL, "name: thermal, gain_per_degree: 0.001", "name: ageing, loss: 0.01, travel: 100"),
+}
+ALLOWED = "emit: {compensation: {noise_gain: 1.0e+4}}\n"
+
+
+def model(name: str, *effects: str, front: str = "") -> Model:
+    return Model(parse_parameters(chain(name, *effects, front=front) + ALLOWED, f"{name}.yaml"))
+
+
+@pytest.mark.parametrize("more", [0, 2])
+@pytest.mark.parametrize("name", COMBINED)
+def test_the_c_gives_the_bits_of_the_reference(name: str, more: int) -> None:
+    """Every combination in one floating-point and one fixed-point arithmetic, and behind different fronts."""
+    at = list(COMBINED).index(name) + more
+    one = model(name, *COMBINED[name], front=("", TANH, BRANCHES)[at % 3])
+    with jit.plain():
+        report = hystgen.verify(one, ARITHMETICS[at % 4], "both", "loop", compiler=["gcc"], length=100)
+    assert report.ok, report.table()
+
+
+def codes(one: Model, arithmetic: str) -> tuple[float, float]:
+    """Drive and output units of an arithmetic."""
+    found = one.compiled(arithmetic).codes
+    return (1.0, 1.0) if found is None else (float(found.drive_lsb), float(found.output_lsb))
+
+
+def answers(one: Model, x: Array, arithmetic: str, inverse: bool = False) -> Array:
+    """Answers of the bit-exact reference in output or drive units, for inputs that the arithmetic can hold."""
+    asked = one.inverse() if inverse else one
+    units = codes(one, arithmetic)
+    there, back = units[::-1] if inverse else units
+    given = x if there == 1.0 else np.rint(x / there).astype(np.int64)
+    return np.asarray(asked.simulate(given, arithmetic=arithmetic), dtype=np.float64) * back
+
+
+def held(one: Model, x: Array, arithmetic: str, unit: int) -> Array:
+    """The inputs as the arithmetic holds them."""
+    step = codes(one, arithmetic)[unit]
+    return np.float32(x).astype(float) if step == 1.0 else np.rint(x / step) * step
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("effect", [TWO, DAHL, SOFT])
+def test_both_operators_follow_the_model(effect: str, arithmetic: str) -> None:
+    """Errors are a few roundings: in floating point of the largest output, in fixed point of the codes."""
+    one = model("one", effect)
+    low, high = one.cascade.input_range
+    v = 0.5 * (low + high) + 0.45 * (high - low) * np.sin(np.cumsum(np.random.default_rng(4).uniform(0.0, 0.1, 3000)))
+    v = held(one, v, arithmetic, 0)
+    y = one.simulate(v)
+    size, slopes = float(np.max(np.abs(y))), 2.0  # the sum of all weights is below 2.6, the least slope above 0.5
+    units = codes(one, arithmetic)
+    unit = {"float32": 2.0**-24 * size, "float64": 2.0**-53 * size}.get(arithmetic, units[1])
+    found = answers(one, v, arithmetic)
+    assert np.max(np.abs(found - y)) < 16.0 * unit
+    references = held(one, y, arithmetic, 1)
+    sent = answers(one, references, arithmetic, inverse=True)
+    assert np.max(np.abs(one.simulate(sent) - references)) < 16.0 * unit + slopes * units[0] * (units[0] < 1.0)
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+def test_a_dithered_rest_gathers_no_error(arithmetic: str) -> None:
+    """A million moves of a last bit either way: the exact law then relaxes z by as much as the arithmetic does."""
+    one = model("one", TWO)
+    low, high = one.cascade.input_range
+    drive, output = codes(one, arithmetic)
+    bit = drive if drive < 1.0 else 2.0**-23 * 2.0
+    begin = held(one, np.linspace(low, low + 0.7 * (high - low), 400), arithmetic, 0)
+    v = np.concatenate([begin, begin[-1] + np.tile([bit, 0.0], 500_000)])
+    v = held(one, v, arithmetic, 0)
+    y = one.simulate(v)
+    found = answers(one, v, arithmetic)
+    unit = output if drive < 1.0 else 2.0**-24 * float(np.max(np.abs(y)))
+    assert np.max(np.abs(found - y)) < 16.0 * unit

@@ -960,6 +960,7 @@ REFUSED = {
     "name: drift, rate: 0.1": "a clock that runs by itself",
     "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001": "own heat",
     "name: noncongruent, coefficients: [[9], [9], [9], [9], [9], [9]]": "there is no inverse",
+    "name: bouc_wen, weights: [-9], widths: [1]": "right after a turn the output falls as the drive rises",
 }
 
 

@@ -206,11 +206,12 @@ def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
 @pytest.mark.parametrize(("effect", "named"), [
     ("name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", "rate_dependence"),
     ("name: noncongruent, shape: centre, amplitude: 0.3, centre: 0, width: 2", "noncongruent"),
+    ("name: bouc_wen, weights: [-0.1], widths: [1]", "bouc_wen"),
 ])  # fmt: skip
 def test_plays_that_an_effect_moves_or_bends_are_those_of_engine_loop(effect: str, named: str) -> None:
     one = model(chain("moved", effect, "name: creep, time_constants: [0.1], weights: [0.05]"))
     assert one.engine("auto") == "loop"
-    with pytest.raises(UnsupportedEffectsError, match=rf"{named} moves or bends each play.*give --engine loop"):
+    with pytest.raises(UnsupportedEffectsError, match=rf"{named} moves, bends or joins them.*give --engine loop"):
         one.engine("corners")
 
 

@@ -530,7 +530,7 @@ def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path
 
 EVERY_EFFECT = (
     "everything", "worn", "dashpot", "viscous", "relaxing", "dilated", "drifting", "heated", "rubbed", "quick",
-    "straight",
+    "straight", "forgetful",
 )  # fmt: skip
 """Chains that together have every effect and every kind of table."""
 

@@ -142,7 +142,7 @@ class FixedPiece(Struct):
 
 class FixedElement(Struct):
     """An element: factors from a move of the input, of at most `far`, to a distance on the curve, and from there to the
-    sum, without the bits that their products leave out."""
+    sum, with left shifts of the argument of the first and of the product of the second."""
 
     distance: AnyFactor
     amplitude: AnyFactor
@@ -364,7 +364,7 @@ class PlaysPart(Generic[T, F]):
     coded: Callable[[], F]
 
 
-class Parallel(NamedTuple):
+class ParallelTerms(NamedTuple):
     """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
     input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
     error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
@@ -394,6 +394,6 @@ class ElementsPart:
     """An effect in parallel with the plays: `of` describes it, from the effect and the span of its input; `floating`:
     its functions; `coded` loads them in fixed point."""
 
-    of: Callable[..., Parallel]
+    of: Callable[..., ParallelTerms]
     floating: Elements
     coded: Callable[[], Elements]

@@ -182,10 +182,10 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 #ifdef HYSTGEN_INVERSE
 #ifdef HYSTGEN_HAS_ELEMENTS
     const bool turned = hystgen_operator_elements(self, w);
-#else
-    const bool turned = false;
-#endif
     if (!self->moving || turned || w != self->search.input) {
+#else
+    if (!self->moving || w != self->search.input) {
+#endif
         hystgen_operator_release(self, w);
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);

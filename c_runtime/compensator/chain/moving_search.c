@@ -88,11 +88,6 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
 /* Input of the plays at which their sum is h: the nearer of two neighbours, or one input beyond all
    if the sum is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
-#ifdef HYSTGEN_HAS_ELEMENTS
-    const bool turns = hystgen_inverse_turns(self, h);
-#else
-    const bool turns = false;
-#endif
     self->search.low = -HYSTGEN_LARGEST_INPUT - 1;
     self->search.top = HYSTGEN_LARGEST_INPUT;
     self->search.short_of = 0;
@@ -101,12 +96,16 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     self->search.tries = 0;
     self->search.input = self->play[0];
     self->search.before = self->play[0];
-#ifdef HYSTGEN_HAS_PLAIN_PLAYS
-    if (turns) /* else they have just followed an input, at which their sum is known */
+#ifndef HYSTGEN_HAS_PLAIN_PLAYS
+#ifdef HYSTGEN_HAS_ELEMENTS
+    (void)hystgen_inverse_turns(self, h);
 #endif
-    {
+    self->search.found = hystgen_inverse_sum(self, self->search.input);
+#elif defined(HYSTGEN_HAS_ELEMENTS)
+    if (hystgen_inverse_turns(self, h)) {
         self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
+#endif /* plain plays have just followed an input, at which their sum is known */
     while (!hystgen_inverse_over(&self->search)) {
         hystgen_inverse_advance(&self->search);
 #ifdef HYSTGEN_HAS_PLAIN_PLAYS

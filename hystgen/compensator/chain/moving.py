@@ -45,7 +45,7 @@ def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None
     return [MOVES.of(effect, r, p) for effect in effects if effect.moves_plays()]
 
 
-def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.Parallel]:
+def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.ParallelTerms]:
     """The elements in parallel with the plays, if an effect adds them."""
     low, high = static.play_range
     return [ELEMENTS.of(effect, high - low) for effect in effects if effect.joins_plays()]

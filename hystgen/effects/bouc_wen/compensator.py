@@ -10,7 +10,7 @@ import numpy as np
 from hystgen.basics.jit import Scalar, jit
 from hystgen.effects.bouc_wen.curve import halves
 from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach
-from hystgen.effects.bouc_wen.pieces import Pieces, largest, pieces
+from hystgen.effects.bouc_wen.pieces import CurvePieces, largest, pieces
 from hystgen.effects.part import late
 from hystgen.effects.plays import (
     ElementNumbers,
@@ -19,7 +19,7 @@ from hystgen.effects.plays import (
     ElementsState,
     ElementState,
     ElementTables,
-    Parallel,
+    ParallelTerms,
 )
 
 DEGREE = 7
@@ -31,7 +31,7 @@ FINEST, EXACT = 0.5, 1e-14
 `test_bouc_wen::test_the_curve_is_its_equation` bounds."""
 
 
-class Memory:
+class LoadedElements:
     """Elements in double precision, one input at a time."""
 
     def __init__(self, effect: BoucWenElements | DahlElements) -> None:
@@ -71,14 +71,14 @@ class Memory:
         self.input = w
 
 
-def of(effect: BoucWenElements | DahlElements, span: float) -> Parallel:
+def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
     """What a compensator needs to know of an effect's elements, for inputs within `span`."""
     exponent, balance = effect.law
     weights, widths = np.array(effect.weights), np.array(effect.widths)
     most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
     steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
 
-    def polynomials(dtype: Any) -> Pieces:
+    def polynomials(dtype: Any) -> CurvePieces:
         return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
 
     def error(dtype: Any, emitted: bool) -> float:
@@ -96,8 +96,8 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> Parallel:
         return ElementTables(np.array(rows, dtype=dtype), ElementNumbers.of(numbers, dtype))
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
-    return Parallel(
-        weights, most * widths, steepest, Memory(effect), tables, error,
+    return ParallelTerms(
+        weights, most * widths, steepest, LoadedElements(effect), tables, error,
         lambda step, unit: coded[0]()(effect, step, unit), lambda: coded[1]()(effect),
     )
 

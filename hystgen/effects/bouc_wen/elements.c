@@ -24,12 +24,17 @@ static int64_t hystgen_by_slope(int64_t x, int32_t slope) {
     return hystgen_times(x, &f);
 }
 
+/* y times h = 0 .. 1, in units of 2^-31. */
+static inline int32_t hystgen_piece_part(int32_t y, int32_t h) {
+    return (int32_t)(((int64_t)y * h + ((int64_t)1 << 30)) >> 31);
+}
+
 /* c_0 + h (c_1 + h (c_2 + ..)), h = 0 .. 1 in units of 2^-31. */
 static int32_t hystgen_mean_slope(const int32_t *c, int32_t h) {
     int32_t slope = c[HYSTGEN_CURVE_DEGREE - 1u];
     unsigned int k;
     for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0; --k) {
-        slope = c[k - 1u] + (int32_t)(((int64_t)slope * h + ((int64_t)1 << 30)) >> 31);
+        slope = c[k - 1u] + hystgen_piece_part(slope, h);
     }
     return slope;
 }
@@ -63,7 +68,7 @@ static int64_t hystgen_element_distance(unsigned int j, int64_t way) {
     } else if (way < -t->far) {
         inside = -t->far;
     }
-    return hystgen_times(inside, &t->distance) * ((int64_t)1 << t->distance_lift);
+    return hystgen_times(inside * ((int64_t)1 << t->distance_lift), &t->distance);
 }
 
 /* z/width of an element at the distance x since its last turn. Backwards, where a search may try
@@ -108,15 +113,14 @@ static void hystgen_element_put(hystgen_element_t *e) {
     const int64_t x = (int64_t)h * ((int64_t)1 << piece->scale);
     unsigned int first;
     unsigned int k;
-    for (k = 0; k < HYSTGEN_CURVE_DEGREE; ++k) {
-        e->c[k] = piece->up[k];
+    e->c[HYSTGEN_CURVE_DEGREE - 1u] = piece->up[HYSTGEN_CURVE_DEGREE - 1u];
+    for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0; --k) {
+        e->c[k - 1u] = piece->up[k - 1u] + hystgen_piece_part(e->c[k], h);
     }
-    for (first = 0; first < HYSTGEN_CURVE_DEGREE; ++first) {
-        for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0 && k >= first; --k) {
-            e->c[k - 1u] += (int32_t)(((int64_t)e->c[k] * h + ((int64_t)1 << 30)) >> 31);
-        }
-        if (first == 0) {
-            e->level = piece->level + hystgen_by_slope(x, e->c[0]);
+    e->level = piece->level + hystgen_by_slope(x, e->c[0]);
+    for (first = 1; first < HYSTGEN_CURVE_DEGREE; ++first) {
+        for (k = HYSTGEN_CURVE_DEGREE - 1u; k >= first; --k) {
+            e->c[k - 1u] += hystgen_piece_part(e->c[k], h);
         }
     }
     e->place = piece->begin + x;
@@ -208,16 +212,14 @@ static void hystgen_element_put(hystgen_element_t *e, hystgen_real_t s) {
         h = h * u + piece[k];
     }
     h = h * u;
-    for (k = 0; k < HYSTGEN_CURVE_DEGREE; ++k) {
-        e->c[k] = piece[2u + k];
+    e->c[HYSTGEN_CURVE_DEGREE - 1u] = piece[HYSTGEN_CURVE_DEGREE + 1u];
+    for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0; --k) {
+        e->c[k - 1u] = piece[k + 1u] + h * e->c[k];
     }
-    e->level = piece[1];
-    for (first = 0; first < HYSTGEN_CURVE_DEGREE; ++first) {
-        for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0 && k >= first; --k) {
+    e->level = piece[1] + h * e->c[0];
+    for (first = 1; first < HYSTGEN_CURVE_DEGREE; ++first) {
+        for (k = HYSTGEN_CURVE_DEGREE - 1u; k >= first; --k) {
             e->c[k - 1u] = e->c[k - 1u] + h * e->c[k];
-        }
-        if (first == 0) {
-            e->level = piece[1] + h * e->c[0];
         }
     }
     e->place = piece[0] + h;

@@ -17,7 +17,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.bouc_wen.compensator import drifted
 from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements
-from hystgen.effects.bouc_wen.pieces import Pieces, pieces
+from hystgen.effects.bouc_wen.pieces import CurvePieces, pieces
 from hystgen.effects.plays import (
     Elements,
     ElementsState,
@@ -28,8 +28,14 @@ from hystgen.effects.plays import (
 )
 from hystgen.plays.slots import Reals
 
-UNIT, SLOPE, BACK = 44, 27, 28
-"""Bits of places and values, of slopes, which are at most 8, and of shares of a piece over shares of its rise."""
+UNIT = 44
+"""Bits of places and values."""
+
+SLOPE = 27
+"""Bits of slopes, which are at most 8."""
+
+BACK = 28
+"""Bits of shares of a piece over shares of its rise."""
 
 DEGREE = 5
 """Degree of the curve's polynomials."""
@@ -42,7 +48,7 @@ FAR = 2**49
 
 
 @functools.cache
-def _pieces(exponent: float, balance: float) -> Pieces:
+def _pieces(exponent: float, balance: float) -> CurvePieces:
     return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
 
 
@@ -123,7 +129,8 @@ def distance(t: FixedElementTables, j: int, way: int) -> int:
     """A move of the input in widths of element j."""
     far = t.element.far[j]
     inside = min(max(way, -far), far)
-    return times(inside, t.element.distance.mantissa[j], t.element.distance.shift[j]) << t.element.distance_lift[j]
+    by = t.element.distance
+    return times(inside << t.element.distance_lift[j], by.mantissa[j], by.shift[j])
 
 
 @jit

@@ -34,7 +34,7 @@ LARGEST = 1e36
 """Largest coefficient: float32 holds numbers up to 3.4e38."""
 
 
-class Pieces(NamedTuple):
+class CurvePieces(NamedTuple):
     """A curve C between places `begin` (K + 1,): on piece k, over h from `begin[k]`, C is `level[k]` (K + 1,) plus
     `h (up[k, 0] + h (up[k, 1] + ..))`, and the place of the value `level[k] + u` is `begin[k] + u (back[k, 0] + ..)`.
 
@@ -63,7 +63,7 @@ def largest(width: float, exponent: float, balance: float, span: float) -> float
 
 
 @functools.lru_cache(maxsize=16)
-def pieces(exponent: float, balance: float, degree: int, allowed: float, shortest: float = 0.0) -> Pieces:
+def pieces(exponent: float, balance: float, degree: int, allowed: float, shortest: float = 0.0) -> CurvePieces:
     """The curve as polynomials of a `degree`, from -1 until it is within `allowed` of 1; each errs by at most
     `allowed`. `shortest`: if given, lengths are powers of 2, at least this one, and the polynomials of shares of a
     piece and of its rise have coefficients that sum up to less than `MOST_SUM`."""
@@ -98,7 +98,7 @@ def pieces(exponent: float, balance: float, degree: int, allowed: float, shortes
         back.append(there[1])
         error, slip = max(error, missed), max(slip, off)
     places = np.array([*begin, last])
-    return Pieces(places, curve(places), np.array(up), np.array(back), error + allowed, slip)
+    return CurvePieces(places, curve(places), np.array(up), np.array(back), error + allowed, slip)
 
 
 def _largest(polynomials: tuple[Array, Array], a: float, b: float) -> float:
