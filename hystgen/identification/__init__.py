@@ -143,7 +143,7 @@ def identify(
     courses, notes = prepared.courses(fit_records, before, skip)
     held, more = prepared.courses(held_records, before, skip)
     reported += notes + more
-    kinds = gpi.KINDS if model == "auto" else (model,)
+    kinds = (*gpi.KINDS, gpi.PARALLEL) if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
     with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
@@ -433,6 +433,8 @@ def _parameters(
     stages = [stage_content(stage) for stage in fitted.stages]
     if stages:
         described["memoryless"] = stages[0] if len(stages) == 1 else stages
+    if fitted.parallel is not None:
+        described["effects"] = [fitted.parallel.model_dump(exclude_defaults=True)]
     content["model"] = described
     return make_parameters(content)
 

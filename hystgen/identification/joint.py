@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.chain.static import directions, through_stages
+from hystgen.effects.base import Candidate, Effect
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
@@ -76,8 +77,18 @@ class Front(Protocol):
         A search uses them unrounded, because differences of two numbers rounded to ten digits would lose six digits.
         """
 
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect | None:
+        """The effect that adds a term to the play sum, rounded likewise; None if the model has none."""
 
-class _Bounded:
+
+class _Alone:
+    """Fronts of plays with nothing in parallel."""
+
+    def parallel(self, shape: Array, digits: int | None = None) -> None:
+        """None."""
+
+
+class _Bounded(_Alone):
     """Fronts that increase everywhere within their bounds."""
 
     def slack(self, shape: Array) -> Array:
@@ -221,7 +232,7 @@ class BentFront(_Bounded):
 
 
 @dataclass(frozen=True)
-class Tanh:
+class Tanh(_Alone):
     """Tanh envelopes with one branch or two (45).
 
     The shape of a branch is `a1` times half the drive range, and the position of its steepest point, measured from the
@@ -300,6 +311,42 @@ class Tanh:
             if short > 0.0:
                 stage = TanhEnvelope(stage.ascending, _branch((*down, lift + 1.01 * short + 1e-9 * half), digits))
         return stage
+
+
+@dataclass(frozen=True)
+class Parallel(_Bounded):
+    """Elements in parallel with the plays, and no stage; the shape is the candidate's parameters."""
+
+    candidate: Candidate
+
+    @property
+    def name(self) -> str:
+        """The effect's name; a second row of the table never has the same one, as only one shape is chosen."""
+        return self.candidate.build(self.candidate.start).name
+
+    @property
+    def straight(self) -> Array:
+        """The first start, at which the elements do nothing."""
+        return self.candidate.start
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The candidate's."""
+        return self.candidate.low, self.candidate.high
+
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
+        """No stages."""
+        return ()
+
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect:
+        """The elements."""
+        effect = self.candidate.build(shape)
+        numbers = {key: value for key, value in effect.model_dump().items() if isinstance(value, tuple | float)}
+        made = {
+            key: _numbers([value], digits)[0] if isinstance(value, float) else tuple(_numbers(value, digits))
+            for key, value in numbers.items()
+        }
+        return effect.model_copy(update=made)
 
 
 def _branch(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
@@ -384,8 +431,76 @@ class LocalFit:
         return self.derived()
 
 
-def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input replaces the drive and the history."""
+def through_front(item: Course, stages: Sequence[Stage], parallel: Effect | None = None) -> Course:
+    """The course as the plays see it: their input replaces the drive and the history, and their part of the output,
+    without a term in parallel, the output."""
+    inner = _through(item, stages)
+    if parallel is None:
+        return inner
+    forgotten = _forgotten(inner, parallel)
+    return replace(
+        inner, y=inner.y - term(inner, parallel), forgotten=forgotten, first=max(forgotten, inner.first)
+    )
+
+
+AFAR = 50.0
+"""[drive ranges] Distance from which the input comes to bring the elements to a limit: they are at most as wide as the
+range, and exp(-50) is 2e-22."""
+
+APPROACHES = 60
+"""[evaluations] Maximum number in the search for an approach; 20 to 30 are usual."""
+
+
+def term(inner: Course, parallel: Effect) -> Array:
+    """The term (N,) in parallel with the plays along a course behind the front."""
+    before = np.array([inner.v[0] + inner.approach] if inner.visited is None else inner.visited)
+    return parallel.parallel(np.concatenate([before, inner.v]))[len(before) :]
+
+
+def _limits(inner: Course, parallel: Effect) -> tuple[Array, Array]:
+    """The term (N,) if the input came to the first sample from far above and from far below."""
+    far = AFAR * float(np.ptp(inner.v))
+    above, below = (term(replace(inner, approach=way * far), parallel) for way in (1.0, -1.0))
+    return above, below
+
+
+def _forgotten(inner: Course, parallel: Effect) -> int:
+    """First sample from which a term in parallel depends on an unknown start by less than `AS_FAR` of the output.
+
+    At every sample, any start leaves the elements between the two limits. If more than half of the samples depend on
+    the start, those from the middle on are compared.
+    """
+    if inner.visited is not None:
+        return 0
+    above, below = _limits(inner, parallel)
+    late = np.flatnonzero(np.abs(above - below) > reduction.AS_FAR * inner.output_range)
+    end = int(late[-1]) + 1 if len(late) else 0
+    return min(end, (inner.begin + inner.last) // 2)
+
+
+def approached(item: Course, stages: Sequence[Stage], parallel: Effect, thresholds: Array, weights: Array) -> Course:
+    """The course with the approach of its first input that explains its compared samples best."""
+    from scipy.optimize import minimize_scalar
+
+    inner = _through(item, stages)
+    if inner.visited is not None:
+        return item
+    rest = inner.y - reduction.prediction(inner.v, None, thresholds, weights)
+    first = replace(inner, forgotten=_forgotten(inner, parallel)).resettled(float(thresholds[-1])).first
+    far = math.log1p(AFAR * float(np.ptp(inner.v)) / (scale := 1e-3 * float(np.ptp(inner.v))))
+
+    def approach(x: float) -> float:
+        return math.copysign(scale * math.expm1(abs(x) * far), x)
+
+    def error(x: float) -> float:
+        e = (rest - term(replace(inner, approach=approach(x)), parallel))[first : item.last]
+        return float(np.nanvar(e))
+
+    found = minimize_scalar(error, bounds=(-1.0, 1.0), method="bounded", options={"xatol": 1e-7, "maxiter": APPROACHES})
+    return replace(item, approach=approach(float(found.x)))
+
+
+def _through(item: Course, stages: Sequence[Stage]) -> Course:
     if not stages:
         return item
     rising, visited = _session(item, stages)
@@ -406,16 +521,18 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
 
 
-def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> LocalFit:
-    """The best shape near `shape`, with non-negative weights for the plays at `thresholds`."""
-    stages = front.stages(shape)
-    plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
+def refine(
+    courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None, most: int = MOST_STEPS
+) -> LocalFit:
+    """The best shape near `shape` in at most `most` steps, with non-negative weights for the plays at `thresholds`."""
+    stages, parallel = front.stages(shape), front.parallel(shape)
+    plain = reduction.reduce([through_front(item, stages, parallel) for item in courses], thresholds, tick)
     p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
 
     def linear(s: Array, q: Array) -> LocalFit:
         return _linear(courses, front, s, q, thresholds, tick)
 
-    return search(linear, front, linear(shape, p))[0]
+    return search(linear, front, linear(shape, p), most)[0]
 
 
 class Limits(Protocol):
@@ -506,11 +623,11 @@ def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thr
 
 def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:
     """Rows of the system linearised about a shape and weights, for one in `every` samples."""
-    versions = [front.stages(shape)]
+    versions = [(front.stages(shape), front.parallel(shape))]
     for j in range(len(shape)):
         one = shape.copy()
         one[j] += DIFFERENCE
-        versions.append(front.stages(one))
+        versions.append((front.stages(one), front.parallel(one)))
 
     def source(course: Course, thresholds: Array) -> Source:
         return _rows_with_derivatives(course, thresholds, versions, p, every)
@@ -519,11 +636,15 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 
 
 def _rows_with_derivatives(
-    course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
+    course: Course, thresholds: Array, versions: Sequence[tuple[Sequence[Stage], Effect | None]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and how each other version changes their weighted sum."""
+    """The plays behind the first version of a front, and how each other version changes their weighted sum.
+
+    A term in parallel with the plays is subtracted from y, and its changes are part of those of the sum.
+    """
     carried = []
-    for stages in versions:
+    terms = [None if one is None else term(_through(course, stages), one) for stages, one in versions]
+    for stages, _ in versions:
         rising, visited = _session(course, stages)
         first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
         carried.append((stages, rising, reduction.start_states(first, visited, thresholds)))
@@ -539,10 +660,13 @@ def _rows_with_derivatives(
             if k == 0:
                 found[:, 1 : n1 + 1] = moved.T
             sums.append(operators.weighted_sum(p, moved))
+        for k, one in enumerate(terms):
+            if one is not None:
+                sums[k] = sums[k] + one[start:stop]
         for k, total in enumerate(sums[1:]):
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
-        found[:, -1] = course.y[start:stop]
+        found[:, -1] = course.y[start:stop] if terms[0] is None else course.y[start:stop] - terms[0][start:stop]
         # one sample in `every` stands for all `every`
         found = found[-start % every :: every]
         return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]
