@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hystgen import effects
 from hystgen.effects.base import About, Effect
 from hystgen.front.stage import Stage
-from hystgen.identification import faults, joint, pi, reduction, start
+from hystgen.identification import elements, faults, joint, pi, reduction, start
 from hystgen.identification.joint import DeadZones, Front, Kept, Parallel, Tanh, even_breaks
 from hystgen.identification.pi import DIGITS, IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
@@ -89,7 +89,7 @@ class FittedModel:
         """Held-out courses, with start memories if their history is unknown."""
         r, p = self.solution.thresholds, self.solution.weights
         if self.parallel is not None:
-            courses = [joint.approached(item, self.stages, self.parallel, r, p) for item in courses]
+            courses = [elements.approached(item, self.parallel, r, p) for item in courses]
             if len(r) == 1:  # there are no plays whose start could be estimated
                 return [replace(item, first=self.inner(item).resettled(0.0).first) for item in courses]
         return _without(self.parallel, self.stages, courses, lambda items: start.of_model(items, self.stages, r, p))
@@ -188,9 +188,10 @@ def _finished(
     shape = shaped.shape
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
-        fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    if parallel is None:  # a front does not change the sense of the loops
-        fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))
+        least = 0.0 if fitted.parallel is None else start.ROUNDING
+        fitted = replace(fitted, solution=fitted.solution.without_idle_plays(least))
+    # neither a front nor elements change the sense of the recorded loops
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -206,7 +207,7 @@ def _with_approaches(
     found = list(courses)
     for _ in range(ROUNDS):
         parallel = front.parallel(shaped.shape)
-        found = [joint.approached(item, (), parallel, thresholds, shaped.best) for item in found]
+        found = [elements.approached(item, parallel, thresholds, shaped.best) for item in found]
         shaped = joint.refine(_settled(found, parallel), front, shaped.shape, thresholds, tick)
     return found, shaped
 
@@ -225,7 +226,8 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
         return [Tanh(drive), Tanh(drive, 2)]
     if kind == PARALLEL:
         about = _about(courses, drive)
-        return [Parallel(each) for shape in effects.shapes(PARALLEL) for each in shape.candidates(about)]
+        shapes = [each for shape in effects.shapes(PARALLEL) for each in shape.candidates(about)]
+        return [Parallel(each) for each in sorted(shapes, key=lambda each: (each.beyond != "", len(each.start)))]
     if isinstance(breaks, tuple):
         if not all(drive[0] < place < drive[1] for place in breaks):
             raise IdentificationError(

@@ -21,7 +21,7 @@ from hystgen.effects.base import Candidate, Effect
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import pi, reduction
+from hystgen.identification import elements, pi, reduction
 from hystgen.identification.pi import InfeasibleError, root_mean_square, rounded
 from hystgen.identification.reduction import Course, Reduced, Source
 from hystgen.plays import operators
@@ -84,8 +84,9 @@ class Front(Protocol):
 class _Alone:
     """Fronts of plays with nothing in parallel."""
 
-    def parallel(self, shape: Array, digits: int | None = None) -> None:
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect | None:
         """None."""
+        return None
 
 
 class _Bounded(_Alone):
@@ -437,67 +438,9 @@ def through_front(item: Course, stages: Sequence[Stage], parallel: Effect | None
     inner = _through(item, stages)
     if parallel is None:
         return inner
-    forgotten = _forgotten(inner, parallel)
-    return replace(
-        inner, y=inner.y - term(inner, parallel), forgotten=forgotten, first=max(forgotten, inner.first)
-    )
-
-
-AFAR = 50.0
-"""[drive ranges] Distance from which the input comes to bring the elements to a limit: they are at most as wide as the
-range, and exp(-50) is 2e-22."""
-
-APPROACHES = 60
-"""[evaluations] Maximum number in the search for an approach; 20 to 30 are usual."""
-
-
-def term(inner: Course, parallel: Effect) -> Array:
-    """The term (N,) in parallel with the plays along a course behind the front."""
-    before = np.array([inner.v[0] + inner.approach] if inner.visited is None else inner.visited)
-    return parallel.parallel(np.concatenate([before, inner.v]))[len(before) :]
-
-
-def _limits(inner: Course, parallel: Effect) -> tuple[Array, Array]:
-    """The term (N,) if the input came to the first sample from far above and from far below."""
-    far = AFAR * float(np.ptp(inner.v))
-    above, below = (term(replace(inner, approach=way * far), parallel) for way in (1.0, -1.0))
-    return above, below
-
-
-def _forgotten(inner: Course, parallel: Effect) -> int:
-    """First sample from which a term in parallel depends on an unknown start by less than `AS_FAR` of the output.
-
-    At every sample, any start leaves the elements between the two limits. If more than half of the samples depend on
-    the start, those from the middle on are compared.
-    """
-    if inner.visited is not None:
-        return 0
-    above, below = _limits(inner, parallel)
-    late = np.flatnonzero(np.abs(above - below) > reduction.AS_FAR * inner.output_range)
-    end = int(late[-1]) + 1 if len(late) else 0
-    return min(end, (inner.begin + inner.last) // 2)
-
-
-def approached(item: Course, stages: Sequence[Stage], parallel: Effect, thresholds: Array, weights: Array) -> Course:
-    """The course with the approach of its first input that explains its compared samples best."""
-    from scipy.optimize import minimize_scalar
-
-    inner = _through(item, stages)
-    if inner.visited is not None:
-        return item
-    rest = inner.y - reduction.prediction(inner.v, None, thresholds, weights)
-    first = replace(inner, forgotten=_forgotten(inner, parallel)).resettled(float(thresholds[-1])).first
-    far = math.log1p(AFAR * float(np.ptp(inner.v)) / (scale := 1e-3 * float(np.ptp(inner.v))))
-
-    def approach(x: float) -> float:
-        return math.copysign(scale * math.expm1(abs(x) * far), x)
-
-    def error(x: float) -> float:
-        e = (rest - term(replace(inner, approach=approach(x)), parallel))[first : item.last]
-        return float(np.nanvar(e))
-
-    found = minimize_scalar(error, bounds=(-1.0, 1.0), method="bounded", options={"xatol": 1e-7, "maxiter": APPROACHES})
-    return replace(item, approach=approach(float(found.x)))
+    forgotten = elements.forgotten(inner, parallel)
+    y = inner.y - elements.term(inner, parallel)
+    return replace(inner, y=y, forgotten=forgotten, first=max(forgotten, inner.first))
 
 
 def _through(item: Course, stages: Sequence[Stage]) -> Course:
@@ -643,7 +586,7 @@ def _rows_with_derivatives(
     A term in parallel with the plays is subtracted from y, and its changes are part of those of the sum.
     """
     carried = []
-    terms = [None if one is None else term(_through(course, stages), one) for stages, one in versions]
+    terms = [None if one is None else elements.term(_through(course, stages), one) for stages, one in versions]
     for stages, _ in versions:
         rising, visited = _session(course, stages)
         first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
