@@ -110,7 +110,7 @@ class _ParallelElements(Effect):
 
     def transients(self, run: Run) -> Array:
         """`exp(-travel/width_j)`: exact for Dahl's law, whose equation is linear in z while the input moves one way."""
-        return np.exp(-run.travelled / np.array(self.widths)[:, None])
+        return np.asarray(np.exp(-run.travelled / np.array(self.widths)[:, None]))
 
 
 class BoucWenElements(_ParallelElements):
