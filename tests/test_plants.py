@@ -31,7 +31,7 @@ pytestmark = pytest.mark.thorough
 Array = NDArray[np.float64]
 
 PLANTS = Path(__file__).parents[1] / "benchmarks" / "plants"
-NAMES = sorted(effects.catalogue())
+NAMES = case.in_turn()
 BENCH = bench.Bench("dynamic", 0.0, 100.0, 40.0, (1000.0, 1000.0), 1000)
 
 
@@ -66,8 +66,8 @@ class TestApart:
     def test_names_are_the_catalogue(self) -> None:
         from hystgen.parameters.checks import EFFECT_NAMES
 
-        assert set(NAMES) == set(EFFECT_NAMES)
-        assert set(rivals.RIVALS) == set(NAMES)
+        assert set(effects.catalogue()) == {*NAMES, case.OPEN} == set(EFFECT_NAMES)
+        assert set(rivals.RIVALS) == set(effects.catalogue())
 
     def test_no_import_of_the_package(self) -> None:
         sources = sorted(PLANTS.rglob("*.py"))
@@ -204,6 +204,13 @@ class TestEffects:
             matrix, y = matrix[records[record]], y[records[record]]
         x = lsq_linear(matrix, y, (lower, np.inf)).x
         return float(np.sqrt(np.mean((y - matrix @ x) ** 2)))
+
+    def test_loops_that_stay_open_leave_what_no_play_sum_absorbs(self, made: Made) -> None:
+        found = made("open", 0)
+        (item,) = found.present
+        assert item.effect.name == case.OPEN
+        assert item.unabsorbed > 3.0 * found.noise()
+        assert self.left(found) == pytest.approx(item.unabsorbed, rel=0.15)
 
     @pytest.mark.parametrize("seed", range(13), ids=NAMES)
     def test_vanishes_at_strength_zero(self, made: Made, seed: int) -> None:

@@ -145,7 +145,7 @@ def run(base: Base, v: Array, dt: Array, viscosity: Viscosity | None = None, cen
         return _run_relays(base, v, None)
     out = base.p0 * v + _sliders(v, *_elements(base))
     if base.kind == "bouc_wen":
-        out = out + base.bouc_wen[0] * _bouc_wen(v, *base.bouc_wen[1:])
+        out = out + base.bouc_wen[0] * friction(v, *base.bouc_wen[1:])
     return np.asarray(out)
 
 
@@ -256,7 +256,8 @@ def _sliders(v: Array, yields: Array, stiffnesses: Array) -> Array:
 
 
 @njit(cache=True)
-def _bouc_wen(v: Array, length: float, ratio: float, exponent: float) -> Array:
+def friction(v: Array, length: float, ratio: float, exponent: float) -> Array:
+    """Wen's variable in units of the drive, from 0, by Euler steps of a twentieth of the saturation length."""
     z = 0.0
     out = np.empty(len(v))
     for k in range(len(v)):

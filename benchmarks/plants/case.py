@@ -19,9 +19,12 @@ from .plant import Plant
 
 Array = NDArray[np.float64]
 
-KINDS = ("single", "pair", "none", "foreign", "poor", "snr")
+KINDS = ("single", "pair", "none", "foreign", "poor", "snr", "open")
 REPORT = 10_000
 """First seed of the report block."""
+
+OPEN = "bouc_wen"
+"""The effect of the kind `open`, whose minor loops stay open. It is in no other kind: each seed keeps its effects."""
 
 NOISE = (2.0e-4, 2.0e-3)
 """Noise rms as a fraction of the output range: smallest, largest."""
@@ -50,6 +53,7 @@ MOST = {
     "saturation": 0.25,
     "sensor_nonlinearity": 0.12,
     "noncongruent": 0.8,
+    "bouc_wen": 0.24,
 }
 """Largest strength that an effect of a real stage has; 20 for effects not listed."""
 
@@ -175,10 +179,17 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
     )
 
 
+def in_turn() -> list[str]:
+    """Names of the effects that cases with a single effect take in turn."""
+    return sorted(name for name in catalogue() if name != OPEN)
+
+
 def contents(kind: str, seed: int) -> tuple[list[str], str | None]:
     """Names of the effects, and of a foreign fault."""
     kinds = catalogue()
-    names = sorted(kinds)
+    names = in_turn()
+    if kind == "open":
+        return [OPEN], None
     if kind == "foreign":
         faults = list(foreign.FAULTS)
         return [], faults[seed % len(faults)]

@@ -66,7 +66,10 @@ class Plant:
                 x = block(present[name], x, around)
         viscosity = memory.viscosity(present["rate_dependence"]) if "rate_dependence" in present else None
         centre = memory.centre(present["noncongruent"]) if "noncongruent" in present else None
-        return x, base.run(self.hysteresis, np.ascontiguousarray(x), around.dt, viscosity, centre)
+        h = base.run(self.hysteresis, np.ascontiguousarray(x), around.dt, viscosity, centre)
+        if "bouc_wen" in present:
+            h = h + memory.parallel(present["bouc_wen"], np.ascontiguousarray(x), around.bench)
+        return x, h
 
 
 def _around(session: Session) -> Surroundings:

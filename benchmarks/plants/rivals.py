@@ -20,6 +20,7 @@ from scipy.linalg import expm
 from scipy.optimize import minimize
 
 from . import refit
+from .base import friction
 from .effects.drive_side import first_order
 
 Array = NDArray[np.float64]
@@ -366,6 +367,11 @@ def _centred_density(data: Data, x: Array) -> Columns:
     return np.column_stack((columns, bump[:, ::3])), len(range(0, PLAYS - 1, 3))
 
 
+def _open(data: Data, x: Array) -> Columns:
+    element = friction(np.ascontiguousarray(data.course.v), float(x[0]), 0.0, 1.0)
+    return np.column_stack((_plays(data, data.course.v), element[data.course.seen])), 1
+
+
 def _none(_: Data) -> Array:
     return np.empty((1, 0))
 
@@ -418,5 +424,6 @@ RIVALS: dict[str, list[Rival]] = {
     "creep": [Rival(_creep, _none)],
     "drift": [Rival(_drift, _none)],
     "thermal": [Rival(_logged, _none), Rival(_heated, _long_times)],
+    "bouc_wen": [Rival(_open, lambda data: data.span * np.geomspace(0.02, 0.5, 6)[:, None])],
     "ageing": [Rival(_aged(np.log1p), _travels), Rival(_aged(lambda x: 1.0 - np.exp(-x)), _travels)],
 }

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from .case import OPEN
 from .effects import catalogue
 
 EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, float("inf"))
@@ -188,16 +189,20 @@ def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
     free = _of(outcomes, "none")
     foreign = _of(outcomes, "foreign")
     poor = _of(outcomes, "poor")
+    opened = _of(outcomes, "open", visible=True)
+    others = [x for x in outcomes if x.label["kind"] != "open"]
     share("single: right name first", singles, lambda x: x.first_right, 0.97)
     share("single: exact set", singles, lambda x: x.exact, 0.92)
     share("pair: both names", pairs, lambda x: x.all_named, 0.80)
+    share("open loops: right name first", opened, lambda x: x.first_right, 0.95)
+    count("open loops: named in other cases", others if opened else [], lambda x: OPEN in x.confident_wrong)
     count("effect-free: cases with a name", free, lambda x: bool(x.names))
     count("foreign: cases with a name", foreign, lambda x: bool(x.names))
     share("foreign: flagged", foreign, lambda x: x.flagged, 0.98)
     count("poor excitation: confident wrong name", poor, lambda x: bool(x.confident_wrong))
-    everything = [*singles, *pairs, *free, *poor, *foreign]
+    everything = [*singles, *pairs, *opened, *free, *poor, *foreign]
     count("cases without a result", everything, lambda x: x.found is None and not x.refused)
-    left = [x.residual for x in [*singles, *pairs, *free] if x.residual is not None]
+    left = [x.residual for x in [*singles, *pairs, *opened, *free] if x.residual is not None]
     if left:
         found.append(Figure("held-out residual over noise, median", float(np.median(left)), 1.15, len(left), False))
         found.append(Figure("held-out residual over noise, 90 %", float(np.quantile(left, 0.9)), 2.0, len(left), False))
@@ -246,7 +251,8 @@ def curve(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
     """How often each truth (row) was answered by each first name (column); pairs and poor cases are left out."""
     table: dict[str, Counter[str]] = {}
-    chosen = [*_of(outcomes, "single", visible=True), *_of(outcomes, "none"), *_of(outcomes, "foreign")]
+    chosen = [each for kind in ("single", "open") for each in _of(outcomes, kind, visible=True)]
+    chosen += [*_of(outcomes, "none"), *_of(outcomes, "foreign")]
     for outcome in chosen:
         table.setdefault(outcome.row, Counter())[outcome.column] += 1
     return table
@@ -310,7 +316,7 @@ def _of(outcomes: Sequence[Outcome], kind: str, visible: bool = False) -> list[O
 
 def _failed(x: Outcome) -> bool:
     kind = x.label["kind"]
-    if kind in ("single", "pair"):
+    if kind in ("single", "pair", "open"):
         return bool(x.label["visible"]) and not x.exact
     if kind == "foreign":
         return bool(x.names) or not x.flagged

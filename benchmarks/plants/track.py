@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import labels
-from .case import REPORT, SMALL, Case, catalogue, contents, make
+from .case import OPEN, REPORT, SMALL, Case, contents, in_turn, make
 from .run import COMMAND
 from .session import FINER, Planned
 
@@ -133,7 +133,9 @@ def plant(effect: str, seed: int, samples: int = SMALL) -> Case:
     if effect == PAIRS:
         fits = (k for k in itertools.count(REPORT) if set(contents("pair", k)[0]) <= set(EFFECTS))
         return make("pair", next(itertools.islice(fits, seed, None)), samples)
-    number = sorted(catalogue()).index(effect) + len(catalogue()) * seed
+    if effect == OPEN:
+        return make("open", REPORT + seed, samples)
+    number = in_turn().index(effect) + len(in_turn()) * seed
     return make("single", REPORT + _aligned(number), samples)
 
 
@@ -193,7 +195,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
 
 def _aligned(number: int) -> int:
     """The seed in the report block for effect number `number`: from seed 0 on, cases take the effects in turn."""
-    return number - REPORT % len(catalogue())
+    return number - REPORT % len(in_turn())
 
 
 def _call(folder: Path, *words: Any) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import counted
-from hystgen.identification import faults, joint, quality, reduction
+from hystgen.identification import elements, faults, joint, quality, reduction
 from hystgen.identification.quality import ErrorRow, Intervals, table
 from hystgen.identification.reduction import Course, StartMemory
 from hystgen.records import Record, Source, in_units, read_record, write_atomically
@@ -93,9 +93,7 @@ class Fit:
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
         if outside:
             python_warnings.warn(outside, stacklevel=2)
-        inner = self._inner(data, self.history if history is None else visited(history))
-        part = self.parameters.model.pi
-        predicted = reduction.prediction(inner.v, inner.history, np.array(part.thresholds), np.array(part.weights))
+        predicted = self._output(self._inner(data, self.history if history is None else visited(history)))
         if free_offset:
             if data.y is None:
                 raise ValueError(f"{data.name} has no measured column y to take the offset from")
@@ -112,14 +110,12 @@ class Fit:
             raise ValueError(f"{record.name} is not the record {used.name} of {used.samples} samples that was compared")
         wrong, compared = np.zeros(len(record), dtype=bool), used.compared
         wrong[used.bridged] = True
-        part = self.parameters.model.pi
         found = np.full(len(record), np.nan)
         for (first, stop), start in zip(used.parts, used.starts, strict=True):
             here = slice(first, stop)
             drive = replace(record.section(first, stop), v=faults.bridged(record.v[here], wrong[here]))
             visited = None if first in used.gaps else self.history
-            inner = self._inner(drive, visited if start is None else start.turns)
-            output = reduction.prediction(inner.v, inner.history, np.array(part.thresholds), np.array(part.weights))
+            output = self._output(self._inner(drive, visited if start is None else start.turns))
             known = compared[here]
             found[here] = output + float(np.mean((record.y[here] - output)[known]))
         return found
@@ -138,6 +134,15 @@ class Fit:
         v = np.ascontiguousarray(record.v, dtype=np.float64)
         course = Course(record.name, v, v, history, 0, len(v))
         return joint.through_front(course, cascade_of(self.parameters).stages)
+
+    def _output(self, inner: Course) -> NDArray[np.float64]:
+        """The output (N,) of the plays and of the elements in parallel, without offset."""
+        part = self.parameters.model
+        r, p = np.array(part.pi.thresholds), np.array(part.pi.weights)
+        output = reduction.prediction(inner.v, inner.history, r, p)
+        for parallel in part.effects:
+            output += elements.term(inner, parallel)
+        return output
 
     def text(self) -> str:
         """The parameter file: models and records of the fit as comments, then the parameters."""

@@ -1,7 +1,8 @@
-"""Fitting a play sum with a memoryless part in front of it.
+"""Fitting a play sum with a memoryless part in front of it, or with elements in parallel.
 
-The front's shape and the weights are found together (`joint`). Thresholds and weights are then chosen as for a plain
-play sum, with the front's output as the drive (`pi`), and shape and weights are refined once more.
+The shape of the front or of the elements and the weights are found together (`joint`). Thresholds and weights are then
+chosen as for a plain play sum, with the front's output as the drive and without the elements' part of the output
+(`pi`), and shape and weights are refined once more.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import effects
+from hystgen.effects.base import About, Effect
 from hystgen.front.stage import Stage
-from hystgen.identification import faults, joint, pi, reduction, start
-from hystgen.identification.joint import DeadZones, Front, Kept, Tanh, even_breaks
+from hystgen.identification import elements, faults, joint, pi, reduction, start
+from hystgen.identification.joint import DeadZones, Front, Kept, Parallel, Tanh, even_breaks
 from hystgen.identification.pi import DIGITS, IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.plays import operators
@@ -24,7 +27,17 @@ Array = NDArray[np.float64]
 Tick = Callable[[int], None] | None
 
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
-"""Kinds of model that can be fitted; `auto` chooses among them."""
+"""Kinds of model that can be requested."""
+
+PARALLEL = "bouc_wen"
+"""Kind of a model with elements of this effect in parallel with the plays."""
+
+ROUNDS = 3
+"""[searches] Number for the elements and the unknown starts of the records in turn. Set by: FIXME."""
+
+FIRST_STEPS = 3
+"""[steps] Number taken from each start of the elements: the first finds their weights, which begin at 0. The best start
+is then searched to the end. Set by: FIXME."""
 
 BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks tried for a dead-zone sum."""
@@ -65,11 +78,21 @@ class FittedModel:
 
     def inner(self, item: Course) -> Course:
         """A course as the plays see it."""
-        return joint.through_front(item, self.stages)
+        return joint.through_front(item, self.stages, self.parallel)
+
+    @property
+    def parallel(self) -> Effect | None:
+        """The elements in parallel with the plays, if any."""
+        return self.front.parallel(self.shape, DIGITS)
 
     def begun(self, courses: Sequence[Course]) -> list[Course]:
         """Held-out courses, with start memories if their history is unknown."""
-        return start.of_model(courses, self.stages, self.solution.thresholds, self.solution.weights)
+        r, p = self.solution.thresholds, self.solution.weights
+        if self.parallel is not None:
+            courses = [elements.approached(item, self.parallel, r, p) for item in courses]
+            if len(r) == 1:  # there are no plays whose start could be estimated
+                return [replace(item, first=self.inner(item).resettled(0.0).first) for item in courses]
+        return _without(self.parallel, self.stages, courses, lambda items: start.of_model(items, self.stages, r, p))
 
 
 def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, list[Course]]:
@@ -97,11 +120,13 @@ def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[Fitte
 
 @dataclass(frozen=True)
 class _Found:
-    """A front, its shape with a dense list of plays behind it, and its error on blocks left out of the fit."""
+    """A front, its shape with a dense list of plays behind it, its error on blocks left out of the fit, and the courses
+    with their approaches."""
 
     front: Front
     shape: Array
     error: float
+    courses: Sequence[Course]
 
 
 def _by_blocks(found: Sequence[_Found]) -> _Found:
@@ -128,33 +153,68 @@ def _solved(
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
     found: list[_Found] = []
     for front in fronts_of(kind, compared, how.breaks):
-        shaped = _shaped(compared, front, fine, found[-1].shape if found else None, how.tick)
-        found.append(_Found(front, shaped.shape, validation(shaped, front)))
-    return [_finished(courses, compared, each, plain, how) for each in choose(found)]
+        begun, shaped = _shaped(compared, front, fine, found, how.tick)
+        found.append(_Found(front, shaped.shape, validation(shaped, front), begun))
+    return [_finished(courses, each, plain, how) for each in choose(found)]
+
+
+def _without(
+    parallel: Effect | None, stages: Sequence[Stage], courses: Sequence[Course],
+    found: Callable[[Sequence[Course]], list[Course]],
+) -> list[Course]:
+    """The courses with the start memories that are found without the output of elements in parallel with the plays."""
+    if parallel is None:
+        return found(courses)
+    inner = [joint.through_front(item, stages, parallel) for item in courses]
+    plays = [replace(item, y=each.y, forgotten=each.forgotten) for item, each in zip(courses, inner, strict=True)]
+    return [replace(each, y=item.y) for each, item in zip(found(plays), courses, strict=True)]
 
 
 def _finished(
-    courses: Sequence[Course], compared: Sequence[Course], found: _Found, plain: Solution, how: How
+    courses: Sequence[Course], found: _Found, plain: Solution, how: How
 ) -> tuple[FittedModel, list[Course]]:
     """The fit with a front: plays placed behind it, and its shape refitted for them."""
     front, shape = found.front, found.shape
-    courses = start.needed(courses, front.stages(shape, DIGITS), how.wanted)
+    courses = [replace(item, approach=each.approach) for item, each in zip(courses, found.courses, strict=True)]
+    stages, parallel = front.stages(shape, DIGITS), front.parallel(shape, DIGITS)
+    courses = _without(parallel, stages, courses, lambda items: start.needed(items, stages, how.wanted))
     fitted = _solve_behind(courses, front, shape, how)
     # the thresholds may have changed: find the best shape for them again
     r = fitted.solution.thresholds
-    shape = joint.refine(compared, front, shape, r, how.tick).shape
+    shaped = joint.refine(found.courses, front, shape, r, how.tick)
+    if isinstance(front, Parallel):
+        begun, shaped = _with_approaches(found.courses, front, shaped, r, how.tick)
+        courses = [replace(item, approach=each.approach) for item, each in zip(courses, begun, strict=True)]
+    shape = shaped.shape
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
-        fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # a front does not change it
+        least = 0.0 if fitted.parallel is None else start.ROUNDING
+        fitted = replace(fitted, solution=fitted.solution.without_idle_plays(least))
+    # neither a front nor elements change the sense of the recorded loops
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
 
 
+def _with_approaches(
+    courses: Sequence[Course], front: Parallel, shaped: joint.LocalFit, thresholds: Array, tick: Tick
+) -> tuple[list[Course], joint.LocalFit]:
+    """The courses with the approaches of their first samples, and the shape found with them.
+
+    Both are found in turn, since a start that the elements have almost forgotten hardly changes the shape.
+    """
+    found = list(courses)
+    for _ in range(ROUNDS):
+        parallel = front.parallel(shaped.shape)
+        found = [elements.approached(item, parallel, thresholds, shaped.best) for item in found]
+        shaped = joint.refine(_settled(found, parallel), front, shaped.shape, thresholds, tick)
+    return found, shaped
+
+
 def _solve_behind(courses: Sequence[Course], front: Front, shape: Array, how: How) -> FittedModel:
-    stages = front.stages(shape, DIGITS)
-    behind = [joint.through_front(item, stages) for item in courses]
+    stages, parallel = front.stages(shape, DIGITS), front.parallel(shape, DIGITS)
+    behind = [joint.through_front(item, stages, parallel) for item in courses]
     solution, _ = pi.solve(behind, how.wanted, how.floor, how.tick)
     return FittedModel(front, shape, solution)
 
@@ -164,6 +224,10 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
     drive = (min(item.drive_range[0] for item in courses), max(item.drive_range[1] for item in courses))
     if kind == "gpi-tanh":
         return [Tanh(drive), Tanh(drive, 2)]
+    if kind == PARALLEL:
+        about = _about(courses, drive)
+        shapes = [each for shape in effects.shapes(PARALLEL) for each in shape.candidates(about)]
+        return [Parallel(each) for each in sorted(shapes, key=lambda each: (each.beyond != "", len(each.start)))]
     if isinstance(breaks, tuple):
         if not all(drive[0] < place < drive[1] for place in breaks):
             raise IdentificationError(
@@ -173,19 +237,55 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
     return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAK_COUNTS)]
 
 
+def _about(courses: Sequence[Course], drive: tuple[float, float]) -> About:
+    """Ranges of the courses for the candidates of an effect that does not depend on time, which a course does not know:
+    times are in samples."""
+    moves = [np.abs(np.diff(item.v)) for item in courses]
+    longest = float(max(len(item.v) for item in courses))
+    return About(
+        drive, max(item.output_range for item in courses), 1.0, longest, longest,
+        max(float(np.max(each)) for each in moves), sum(float(np.sum(each)) for each in moves), (), timed=False,
+    )
+
+
 def _shaped(
-    courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
-) -> joint.LocalFit:
-    """The best result of several starts; `before`: the shape of the front tried before this one."""
+    courses: Sequence[Course], front: Front, thresholds: Array, before: Sequence[_Found], tick: Tick
+) -> tuple[Sequence[Course], joint.LocalFit]:
+    """The best result of several starts, and the courses with their approaches; `before`: the fronts tried before this
+    one."""
     starts = [front.straight]
-    if isinstance(front, Tanh) and front.branches == 2 and before is not None:
-        starts = [front.doubled(before)]
+    if isinstance(front, Parallel):
+        return _in_parallel(courses, front, thresholds, before, tick)
+    if isinstance(front, Tanh) and front.branches == 2 and before:
+        starts = [front.doubled(before[-1].shape)]
     if isinstance(front, DeadZones):
         convex = convex_start(courses, front)
         if convex is not None:
             starts.append(convex)
     found = [joint.refine(courses, front, shape, thresholds, tick) for shape in starts]
-    return min(found, key=lambda shaped: shaped.rms)
+    return courses, min(found, key=lambda shaped: shaped.rms)
+
+
+def _in_parallel(
+    courses: Sequence[Course], front: Parallel, thresholds: Array, before: Sequence[_Found], tick: Tick
+) -> tuple[list[Course], joint.LocalFit]:
+    """The best elements, from those of the simpler candidate that they contain, or from the best of several starts."""
+    candidate = front.candidate
+    starts = (candidate.start, *candidate.others)
+    simpler = {each.front.candidate.label: each.shape for each in before if isinstance(each.front, Parallel)}
+    if candidate.grown is not None and candidate.beyond in simpler:
+        starts = (candidate.grown(simpler[candidate.beyond]),)
+    if len(starts) > 1:
+        tried = [joint.refine(courses, front, shape, thresholds, tick, FIRST_STEPS) for shape in starts]
+        starts = (min(tried, key=lambda shaped: shaped.rms).shape,)
+    shape = starts[0]
+    shaped = joint.refine(_settled(courses, front.parallel(shape)), front, shape, thresholds, tick)
+    return _with_approaches(courses, front, shaped, thresholds, tick)
+
+
+def _settled(courses: Sequence[Course], parallel: Effect) -> list[Course]:
+    """The courses, compared only where the elements have forgotten an unknown start."""
+    return [replace(item, first=joint.through_front(item, (), parallel).first) for item in courses]
 
 
 def validation(shaped: joint.LocalFit, front: Front) -> float:

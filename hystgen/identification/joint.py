@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.chain.static import directions, through_stages
+from hystgen.effects.base import Candidate, Effect
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import pi, reduction
+from hystgen.identification import elements, pi, reduction
 from hystgen.identification.pi import InfeasibleError, root_mean_square, rounded
 from hystgen.identification.reduction import Course, Reduced, Source
 from hystgen.plays import operators
@@ -76,8 +77,19 @@ class Front(Protocol):
         A search uses them unrounded, because differences of two numbers rounded to ten digits would lose six digits.
         """
 
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect | None:
+        """The effect that adds a term to the play sum, rounded likewise; None if the model has none."""
 
-class _Bounded:
+
+class _Alone:
+    """Fronts of plays with nothing in parallel."""
+
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect | None:
+        """None."""
+        return None
+
+
+class _Bounded(_Alone):
     """Fronts that increase everywhere within their bounds."""
 
     def slack(self, shape: Array) -> Array:
@@ -221,7 +233,7 @@ class BentFront(_Bounded):
 
 
 @dataclass(frozen=True)
-class Tanh:
+class Tanh(_Alone):
     """Tanh envelopes with one branch or two (45).
 
     The shape of a branch is `a1` times half the drive range, and the position of its steepest point, measured from the
@@ -300,6 +312,42 @@ class Tanh:
             if short > 0.0:
                 stage = TanhEnvelope(stage.ascending, _branch((*down, lift + 1.01 * short + 1e-9 * half), digits))
         return stage
+
+
+@dataclass(frozen=True)
+class Parallel(_Bounded):
+    """Elements in parallel with the plays, and no stage; the shape is the candidate's parameters."""
+
+    candidate: Candidate
+
+    @property
+    def name(self) -> str:
+        """The effect's name; a second row of the table never has the same one, as only one shape is chosen."""
+        return self.candidate.build(self.candidate.start).name
+
+    @property
+    def straight(self) -> Array:
+        """The first start, at which the elements do nothing."""
+        return self.candidate.start
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The candidate's."""
+        return self.candidate.low, self.candidate.high
+
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
+        """No stages."""
+        return ()
+
+    def parallel(self, shape: Array, digits: int | None = None) -> Effect:
+        """The elements."""
+        effect = self.candidate.build(shape)
+        numbers = {key: value for key, value in effect.model_dump().items() if isinstance(value, tuple | float)}
+        made = {
+            key: _numbers([value], digits)[0] if isinstance(value, float) else tuple(_numbers(value, digits))
+            for key, value in numbers.items()
+        }
+        return effect.model_copy(update=made)
 
 
 def _branch(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
@@ -384,8 +432,18 @@ class LocalFit:
         return self.derived()
 
 
-def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input replaces the drive and the history."""
+def through_front(item: Course, stages: Sequence[Stage], parallel: Effect | None = None) -> Course:
+    """The course as the plays see it: their input replaces the drive and the history, and their part of the output,
+    without a term in parallel, the output."""
+    inner = _through(item, stages)
+    if parallel is None:
+        return inner
+    forgotten = elements.forgotten(inner, parallel)
+    y = inner.y - elements.term(inner, parallel)
+    return replace(inner, y=y, forgotten=forgotten, first=max(forgotten, inner.first))
+
+
+def _through(item: Course, stages: Sequence[Stage]) -> Course:
     if not stages:
         return item
     rising, visited = _session(item, stages)
@@ -406,16 +464,18 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
 
 
-def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> LocalFit:
-    """The best shape near `shape`, with non-negative weights for the plays at `thresholds`."""
-    stages = front.stages(shape)
-    plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
+def refine(
+    courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None, most: int = MOST_STEPS
+) -> LocalFit:
+    """The best shape near `shape` in at most `most` steps, with non-negative weights for the plays at `thresholds`."""
+    stages, parallel = front.stages(shape), front.parallel(shape)
+    plain = reduction.reduce([through_front(item, stages, parallel) for item in courses], thresholds, tick)
     p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
 
     def linear(s: Array, q: Array) -> LocalFit:
         return _linear(courses, front, s, q, thresholds, tick)
 
-    return search(linear, front, linear(shape, p))[0]
+    return search(linear, front, linear(shape, p), most)[0]
 
 
 class Limits(Protocol):
@@ -506,11 +566,11 @@ def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thr
 
 def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:
     """Rows of the system linearised about a shape and weights, for one in `every` samples."""
-    versions = [front.stages(shape)]
+    versions = [(front.stages(shape), front.parallel(shape))]
     for j in range(len(shape)):
         one = shape.copy()
         one[j] += DIFFERENCE
-        versions.append(front.stages(one))
+        versions.append((front.stages(one), front.parallel(one)))
 
     def source(course: Course, thresholds: Array) -> Source:
         return _rows_with_derivatives(course, thresholds, versions, p, every)
@@ -519,11 +579,15 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 
 
 def _rows_with_derivatives(
-    course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
+    course: Course, thresholds: Array, versions: Sequence[tuple[Sequence[Stage], Effect | None]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and how each other version changes their weighted sum."""
+    """The plays behind the first version of a front, and how each other version changes their weighted sum.
+
+    A term in parallel with the plays is subtracted from y, and its changes are part of those of the sum.
+    """
     carried = []
-    for stages in versions:
+    terms = [None if one is None else elements.term(_through(course, stages), one) for stages, one in versions]
+    for stages, _ in versions:
         rising, visited = _session(course, stages)
         first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
         carried.append((stages, rising, reduction.start_states(first, visited, thresholds)))
@@ -539,10 +603,13 @@ def _rows_with_derivatives(
             if k == 0:
                 found[:, 1 : n1 + 1] = moved.T
             sums.append(operators.weighted_sum(p, moved))
+        for k, one in enumerate(terms):
+            if one is not None:
+                sums[k] = sums[k] + one[start:stop]
         for k, total in enumerate(sums[1:]):
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
-        found[:, -1] = course.y[start:stop]
+        found[:, -1] = course.y[start:stop] if terms[0] is None else course.y[start:stop] - terms[0][start:stop]
         # one sample in `every` stands for all `every`
         found = found[-start % every :: every]
         return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]

@@ -54,10 +54,11 @@ class Sense:
     falls: bool
     clockwise: bool
 
-    def sentences(self, plays: int) -> list[str]:
-        """Warnings for the user, one sentence each; `plays`: number of plays in the fitted model."""
-        found = [FALLING] if self.falls else [CLOCKWISE] if self.clockwise else []
-        return [*found, NO_PLAYS] if plays == 0 else found
+    def sentences(self, plays: int, elements: bool = False) -> list[str]:
+        """Warnings for the user, one sentence each; `plays`: number of plays in the fitted model; `elements`: whether
+        it has elements in parallel with them."""
+        found = [FALLING] if self.falls else [LEADING if elements else CLOCKWISE] if self.clockwise else []
+        return found if plays or elements else [*found, NO_PLAYS]
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,9 @@ class Solution:
     fitted: Weights
     sense: Sense
 
-    def without_idle_plays(self) -> Solution:
-        """The solution without plays whose weight is 0, which have no effect."""
-        kept = (self.weights > 0.0) | (self.thresholds == 0.0)
+    def without_idle_plays(self, least: float = 0.0) -> Solution:
+        """The solution without plays whose weight is at most a fraction of the sum of weights, 0 by default."""
+        kept = (self.weights > least * np.sum(self.weights)) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
 
@@ -179,10 +180,19 @@ FALLING = (
     "is which"
 )
 
-CLOCKWISE = (
-    "the loops run clockwise: y is ahead of v, while every play lags its drive, so no weights can follow them. "
+EXCHANGE = (
     "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=..,y=..): the model "
     "then gives the displacement"
+)
+
+CLOCKWISE = (
+    "the loops run clockwise: y is ahead of v, while every play lags its drive, so no weights can follow them. "
+    + EXCHANGE
+)
+
+LEADING = (
+    "the loops run clockwise: y is ahead of v. The plays lag, and elements with positive weights follow the lead. "
+    + EXCHANGE
 )
 
 NO_PLAYS = "no hysteresis was found: the model has no play besides r_0, and its output follows its input without a loop"
@@ -210,7 +220,7 @@ def runs_clockwise(courses: Sequence[Course]) -> bool:
 
     A lag in either signal adds a width that vanishes at low speed, so the slowest turns with a clear direction count.
     """
-    turns = sorted((turn for item in courses for turn in _turns(item)), key=lambda turn: turn.speed)
+    turns = sorted((turn for item in courses for turn in turns_of(item)), key=lambda turn: turn.speed)
     spent = np.cumsum([abs(turn.later) for turn in turns])
     for share in SLOWEST:
         last = int(np.searchsorted(spent, share * spent[-1])) if turns else -1
@@ -220,7 +230,7 @@ def runs_clockwise(courses: Sequence[Course]) -> bool:
     return False
 
 
-def _direction(turns: Sequence[_Turn], both: bool) -> int:
+def _direction(turns: Sequence[Turn], both: bool) -> int:
     """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: undecided unless there are turns
     both at the top and at the bottom.
 
@@ -253,7 +263,7 @@ def _deviation(error: Array, noise: Array, row: Array) -> float:
 
 
 @dataclass(frozen=True)
-class _Turn:
+class Turn:
     """The two legs of the drive on either side of a turning point, over the drive range `span` that both cover.
 
     `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: delay of the former, in samples;
@@ -271,7 +281,7 @@ class _Turn:
         return self.span / abs(self.later)
 
 
-def _turns(item: Course) -> Iterator[_Turn]:
+def turns_of(item: Course) -> Iterator[Turn]:
     """The turns of the drive of a course between its first and its last compared sample."""
     place = item.begin + np.flatnonzero(np.isfinite(item.y[item.begin : item.last]))
     v, y = item.v[place], item.y[place]
@@ -288,7 +298,7 @@ def _turns(item: Course) -> Iterator[_Turn]:
         count = [np.count_nonzero((leg[0] >= low) & (leg[0] <= high)) * leg[3] for leg in (up, down)]
         deviation = noise * math.sqrt(sum(1.0 / max(each, 1.0) for each in count))
         if mean := float(np.mean(later)):
-            yield _Turn(high - low, widths, mean, deviation)
+            yield Turn(high - low, widths, mean, deviation)
 
 
 def _corners(v: Array) -> list[int]:

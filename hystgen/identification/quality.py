@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
 from hystgen.identification import joint, pi, reduction
+from hystgen.identification.faults import white_noise
 from hystgen.identification.gpi import FittedModel
-from hystgen.identification.pi import FreeRunErrors, Solution, Weights
+from hystgen.identification.pi import FreeRunErrors, Weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record
@@ -110,6 +111,13 @@ def table(rows: Sequence[ErrorRow], unit: str, remarks: Sequence[str]) -> str:
         for line in content
     ]
     return "\n".join([*(line.rstrip() for line in lines), *remarks]) + "\n"
+
+
+def noise_of(courses: Sequence[Course]) -> float:
+    """rms noise of the compared outputs, as far as it is white."""
+    outputs = [item.y[item.compared] for item in courses]
+    squares = sum(white_noise(y) ** 2 * len(y) for y in outputs if len(y) > 3)
+    return float(np.sqrt(squares / max(sum(map(len, outputs)), 1)))
 
 
 # Confidence intervals ----------------------------------------------------------------------------------------
@@ -292,10 +300,11 @@ SMALL_REACH = 0.1
 
 
 def about_model(
-    solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: ErrorRow
+    fitted: FittedModel, wanted: int | tuple[float, ...] | None, courses: Sequence[Course], own: ErrorRow
 ) -> list[str]:
     """Warnings about the model itself, one sentence each."""
-    reported = solution.sense.sentences(int(np.count_nonzero(solution.weights[1:])))
+    solution, compared = fitted.solution, [fitted.inner(item) for item in courses]
+    reported = solution.sense.sentences(int(np.count_nonzero(solution.weights[1:])), fitted.parallel is not None)
     reported += about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
@@ -312,7 +321,7 @@ def about_model(
                 f"{counted(len(beyond), f'play{above} hardly moves', f'plays{above} hardly move')} in these "
                 "records; do not trust their weights for larger drives"
             )
-    outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
+    outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in courses)]
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
     share = 1.0 - own.rms**2 / spread
     if share < 0.9:

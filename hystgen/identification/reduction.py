@@ -62,6 +62,8 @@ class Course:
     memory, if one was searched for. `begin`: first sample that may be compared, regardless of the start memory.
     `origin`: index of the record that the course is part of, and index of the course's first sample in that record.
     `stretches`: samples of y left out in faulty stretches rather than as isolated ones; None if there are none.
+    `approach`: with an unknown history, the input relative to the first one from which elements in parallel with the
+    plays, at rest, came to it; `forgotten`: first sample from which they hardly depend on that.
     """
 
     name: str
@@ -74,6 +76,8 @@ class Course:
     origin: tuple[int, int] = (0, 0)
     stretches: NDArray[np.bool_] | None = None
     start: StartMemory | None = None
+    approach: float = 0.0
+    forgotten: int = 0
 
     @property
     def visited(self) -> tuple[float, ...] | None:
@@ -104,7 +108,7 @@ class Course:
     def resettled(self, largest: float) -> Course:
         """The course, ignoring only as much of its start as necessary for plays up to the threshold `largest`."""
         first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
-        return replace(self, first=max(first, self.begin))
+        return replace(self, first=max(first, self.begin, self.forgotten))
 
 
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:

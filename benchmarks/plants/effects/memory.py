@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import base
 from ..bench import Bench
 from . import Effect, Kind, between, pick, values
+
+Array = NDArray[np.float64]
 
 
 def draw_rate(rng: np.random.Generator, bench: Bench) -> Effect:
@@ -46,7 +49,26 @@ def centre(effect: Effect) -> base.Centre | None:
     return base.Centre(effect.form, effect.strength, effect.values["middle"], effect.values["width"])
 
 
+def draw_open(rng: np.random.Generator, bench: Bench) -> Effect:
+    """An element of friction; with a positive strength the output leads."""
+    form = pick(rng, "dahl", "dahl", "bouc_wen", "sharp")
+    sign = 1.0 if rng.uniform() < 0.3 else -1.0
+    strength = sign * between(rng, 0.03, 0.2)
+    ratio = 0.0 if form == "dahl" else rng.uniform(-0.4, 0.9)
+    exponent = rng.uniform(1.2, 3.0) if form == "sharp" else 1.0
+    numbers = values(length=bench.span * between(rng, 0.04, 0.3), ratio=ratio, exponent=exponent)
+    return Effect("bouc_wen", form, strength, numbers)
+
+
+def parallel(effect: Effect, x: Array, bench: Bench) -> Array:
+    """The element's output; the strength is its slope at a reversal, over the output range per drive range."""
+    numbers = effect.values
+    element = base.friction(x, numbers["length"], numbers["ratio"], numbers["exponent"])
+    return np.asarray(effect.strength * bench.span_out / bench.span * element)
+
+
 KINDS = {
     "rate_dependence": Kind(draw_rate, ("dynamic", "static", "mixed"), "rate"),
     "noncongruent": Kind(draw_noncongruent, ("dynamic", "static", "mixed"), "curve"),
+    "bouc_wen": Kind(draw_open, ("dynamic", "static", "mixed"), "open"),
 }

@@ -1,9 +1,10 @@
 """Whether the hysteresis departs from a play sum: minor loops stay open and depend on the past, at any speed.
 
 A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget gradually
-as the drive travels. An element that does so is fitted in parallel with the plays, like an effect, and judged by the
-same rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are equivalent:
-the element can then replace creep, a lag or a rate dependence, and vice versa.
+as the drive travels. If the search has not named `bouc_wen`, one such element may still show that the hysteresis is of
+this kind: it is fitted in parallel with the plays, judged by the rules for names except that much may remain, and only
+reported. At a single speed, travel and time are equivalent: the element can then replace creep, a lag or a rate
+dependence, and vice versa.
 """
 
 from __future__ import annotations
@@ -11,8 +12,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +24,11 @@ from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried
 from hystgen.diagnosis.search.selection import Outcome, Refusal
-from hystgen.effects.base import Candidate, Effect, Place, Run
-from hystgen.plants import BoucWen
+from hystgen.effects.base import Candidate
+from hystgen.effects.bouc_wen.model import BoucWenElements
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
-
-NAME = "forgetting"
 
 BALANCE = 0.9
 """Balance from which a search starts, between 1 (Dahl's element) and 0.5 (one that unloads in a straight line)."""
@@ -54,29 +51,6 @@ STEPS = 12
 """[steps] Maximum number in the search from the best width; six usually settle three parameters and the weights."""
 
 
-class Forgetting(Effect):
-    """The Bouc-Wen element in parallel with the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
-
-    With the balance b = 1 it is Dahl's friction element, the average of the drive's direction over its travel.
-    """
-
-    name: Literal["forgetting"] = "forgetting"
-    weight: float
-    width: float
-    balance: float
-
-    place: ClassVar[Place] = Place.ADDED
-    timed: ClassVar[bool] = False
-
-    def added(self, run: Run) -> Array:
-        """`weight z`, from z = 0."""
-        return self.weight * run.remembered((NAME, self.width, self.balance), partial(self._element, run))
-
-    def _element(self, run: Run) -> Array:
-        made = BoucWen(0.0, 1.0, D=self.width, beta=self.balance, gamma=1.0 - self.balance)
-        return np.asarray(self.width * made.hysteretic(run.v))
-
-
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     """The element, if the records support it in addition to the effects found or instead of them; else None.
 
@@ -85,7 +59,7 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     kept if the drive covers equal distances in different times, since effects of time and of travel then differ.
     """
     none, now = outcome.refitted, outcome.fitted
-    if records.one_loop or not selection.leaves_enough(none, records):
+    if records.one_loop or not selection.leaves_enough(none, records) or now.actuator.joining:
         return None
     shown = shows_speed([*records.to_fit, *records.held])
     names = tuple(dict.fromkeys(each.name for each in outcome.found))
@@ -167,8 +141,9 @@ def _element(now: Fitted, records: Records) -> Tried:
     low, high = records.known.drive
     wide, slope = high - low, records.known.output_range / (high - low)
 
-    def build(x: Array) -> Forgetting:
-        return Forgetting(weight=slope * float(x[0]), width=wide * float(10.0 ** x[1]), balance=float(x[2]))
+    def build(x: Array) -> BoucWenElements:
+        weights, widths = (slope * float(x[0]),), (wide * float(10.0 ** x[1]),)
+        return BoucWenElements(name="bouc_wen", weights=weights, widths=widths, balance=float(x[2]))
 
     ends = np.log10(WITHIN)
     starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], STARTS)]
@@ -178,7 +153,7 @@ def _element(now: Fitted, records: Records) -> Tried:
     )
 
     def structure(part: Candidate) -> Structure:
-        return replace(now.structure, parts=(*now.structure.parts, Part(NAME, part)))
+        return replace(now.structure, parts=(*now.structure.parts, Part("bouc_wen", part)))
 
     def amount(start: Array) -> fits.Search:
         shape = np.concatenate([now.shape, start])
@@ -188,8 +163,8 @@ def _element(now: Fitted, records: Records) -> Tried:
     whole = structure(candidate)
     fitted = fits.begun(whole, records.quick, begun.now.shape, begun.now.best).further(STEPS).found(now.weights)
     errors = fitted.errors(records.held)
-    option = Option(candidate.label, NAME, whole, whole, tuple(starts))
-    return Tried(option, fitted, (NAME,), rms(errors), errors)
+    option = Option(candidate.label, "bouc_wen", whole, whole, tuple(starts))
+    return Tried(option, fitted, ("bouc_wen",), rms(errors), errors)
 
 
 def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
@@ -216,19 +191,17 @@ def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> boo
 
 def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> NotAPlaySum:
     element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
-    assert isinstance(element, Forgetting)
+    assert isinstance(element, BoucWenElements)
     low, high = records.known.drive
-    return NotAPlaySum(
-        records.residual(now), tried.held_out, element.width / (high - low), _open(tried.fitted, element, low, high),
-        names, shown,
-    )
+    width, gap = element.widths[0] / (high - low), _open(tried.fitted, element, low, high)
+    return NotAPlaySum(records.residual(now), tried.held_out, width, gap, names, shown)
 
 
-def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
+def _open(fitted: Fitted, element: BoucWenElements, low: float, high: float) -> float:
     """Gap left by a minor loop in the middle of the drive range, as a fraction of its height; 0 with plays alone."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)
     v = np.array([low, high, low, end, begin, end])
     r = fitted.structure.thresholds
-    y = fitted.weights @ operators.plays(v, r, np.full(len(r), low)) + element.added(Run(np.arange(6.0), v))
+    y = fitted.weights @ operators.plays(v, r, np.full(len(r), low)) + element.parallel(v)
     return abs(float((y[5] - y[3]) / (y[3] - y[4])))

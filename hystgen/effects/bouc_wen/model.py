@@ -12,7 +12,7 @@ from pydantic import Field
 
 from hystgen.basics.jit import jit
 from hystgen.basics.quantities import Number, Positive
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, not_as_many
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many
 from hystgen.effects.bouc_wen.curve import Half, distance, halves, size
 
 MOST_ELEMENTS = 3
@@ -106,6 +106,11 @@ class _ParallelElements(Effect):
         for weight, width in zip(self.weights, self.widths, strict=True):
             element(np.ascontiguousarray(w), width, weight, *halves(*self.law), total)
         return total
+
+
+    def transients(self, run: Run) -> Array:
+        """`exp(-travel/width_j)`: exact for Dahl's law, whose equation is linear in z while the input moves one way."""
+        return np.asarray(np.exp(-run.travelled / np.array(self.widths)[:, None]))
 
 
 class BoucWenElements(_ParallelElements):
