@@ -117,7 +117,8 @@ typedef struct {
 } hystgen_piece_t;
 
 /* An element: factors from a move of the input, of at most `far`, to a distance on the curve, and
-   from there to the sum, without the bits that their products leave out. */
+   from there to the sum, with left shifts of the argument of the first and of the product of the
+   second. */
 typedef struct {
     hystgen_factor_t distance;
     hystgen_factor_t amplitude;
