@@ -25,7 +25,7 @@ from hystgen.plays import loop
 from hystgen.plays.slots import LOOP, OP_STEP, Bytes
 
 if TYPE_CHECKING:
-    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.compensator.chain.layout import ChainTables, Contents
     from hystgen.effects.kinds import OwnBlock
 
 
@@ -73,17 +73,17 @@ def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operatio
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-    return _chain_operations(found.chain, t.plays.engine == LOOP, drives, outputs)[inverse]
+    return _chain_operations(found.chain, t.plays.engine == LOOP, t.contents(inverse), drives, outputs)
 
 
 @functools.cache
 def _chain_operations(
-    module: str, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
-) -> tuple[Operations, Operations]:
+    module: str, loops: bool, contents: Contents, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+) -> Operations:
     from hystgen.compensator.chain import step as chain_step
 
     own = importlib.import_module(f"hystgen.compensator.chain.{module}")
-    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
+    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, contents, drives, outputs)
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:

@@ -98,6 +98,26 @@ class Stages(NamedTuple):
         return 2
 
 
+class Contents(NamedTuple):
+    """What the functions of one operator of a chain compute; as in the C, there is no code for anything else.
+
+    `parts`: which of `parts.PARTS` have blocks; `front`, `branches`: there is a memoryless part, with two branches;
+    `maps`: there are maps of the output; `moving`: an effect moves or bends plays, or joins them; the others as in `ChainTables`.
+    """
+
+    inverse: bool
+    parts: tuple[bool, ...]
+    front: bool
+    branches: bool
+    maps: bool
+    moving: bool
+    preview: bool
+    slew: bool
+    braked: bool
+    quiet: bool
+    turning: bool
+
+
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
@@ -139,6 +159,15 @@ class ChainTables(NamedTuple):
     def braked(self) -> bool:
         """Whether a lag behind a slew limit is braked, so that it does not overshoot."""
         return bool(self.blocks[LED].braked)
+
+    def contents(self, inverse: bool) -> Contents:
+        """What an operator of the model computes."""
+        parts = (bool(n) and not (inverse and part.forward) for part, n in zip(PARTS, self.counts, strict=True))
+        moving = self.moving.used
+        front, branches = bool(self.plays.has_front), bool(self.plays.branches)
+        flags = self.slew, self.braked, self.quiet, self.turning
+        preview, maps = len(self.tap) > 0, bool(self.behind.kinds)
+        return Contents(inverse, tuple(parts), front, branches, maps, moving, preview, *map(bool, flags))
 
     @property
     def threshold(self) -> Reals:

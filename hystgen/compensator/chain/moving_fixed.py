@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from hystgen.basics.jit import Answer, jit
 from hystgen.compensator.chain.layout import FixedChainTables
-from hystgen.compensator.chain.moving_plays import Kind, operators
+from hystgen.compensator.chain.moving_plays import Kind, operators, unmoved
 from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.plays import FASTEST, SECANTS, FixedMovingTables
@@ -99,6 +99,6 @@ def ordered(_: FixedMovingTables) -> bool:
     return False
 
 
-PLAYS = operators(
-    Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered)
-)
+KIND = Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered)
+PLAYS = operators(KIND)
+UNMOVED = unmoved(KIND)

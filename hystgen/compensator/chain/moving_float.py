@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from hystgen.basics.jit import Answer, Scalar, jit, zero
 from hystgen.compensator.chain.layout import FloatChainTables
-from hystgen.compensator.chain.moving_plays import Kind, operators
+from hystgen.compensator.chain.moving_plays import Kind, operators, unmoved
 from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects import plays as at
@@ -72,6 +72,6 @@ def ordered(m: at.MovingTables) -> bool:
     return m.moves in (at.PLAIN, at.DASHPOT)
 
 
-PLAYS = operators(
-    Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, ordered)
-)
+KIND = Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, ordered)
+PLAYS = operators(KIND)
+UNMOVED = unmoved(KIND)

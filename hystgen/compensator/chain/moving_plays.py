@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hystgen.basics.jit import Scalar, jit
+from hystgen.basics.jit import Answer, Scalar, jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
-from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Bending, Elements, Moves
+from hystgen.effects.plays import RELAXING, Bending, Elements, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
 from hystgen.plays.slots import Reals
 
@@ -28,14 +28,38 @@ class Kind(NamedTuple):
 
 
 @jit(inline=True)
-def plain(m: Any) -> bool:
-    """Whether the loop engine solves for the plays: no effect moves, bends or joins them."""
-    return bool(m.moves == PLAIN and m.bends == STRAIGHT and len(m.elements.element) == 0)
+def start(t: ChainTables, s: ChainState, zero: int) -> None:
+    """Set the plays to the start memory, or all to 0, as `step.plays_of` does."""
+
+
+def unmoved(kind: Kind) -> tuple[Function, Function, Function, Function]:
+    """`start`, `follow`, `started` and `inverse_input` of models whose effects neither move nor bend plays, nor join
+    them, as functions of tables, state and a number."""
+    level: Answer = kind.level
+    solve: Answer = kind.solve
+    asked = kind.asked
+
+    @jit
+    def follow(t: ChainTables, s: ChainState, w: Scalar) -> Scalar:
+        """Move the plays with their input w. Returns their sum."""
+        loop_absorb(t.plays, s.plays, w)
+        return level(t, loop_output(t.plays, s.plays))
+
+    @jit(inline=True)
+    def started(t: ChainTables, s: ChainState) -> Scalar:
+        """The sum of the plays in the start memory."""
+        return level(t, loop_output(t.plays, s.plays))
+
+    @jit(inline=True)
+    def inverse_input(t: ChainTables, s: ChainState, h: Scalar) -> Scalar:
+        """Input of the plays at which their sum is h."""
+        return solve(t.plays, s.plays, asked(t, h))
+
+    return start, follow, started, inverse_input
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
-    """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
-    number."""
+    """The same functions for models with an effect that moves, bends or joins plays."""
     level, asked, solve, moves, (bent, steep), (joined, turn, unload), search, begin, ordered = kind
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
@@ -145,17 +169,10 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     searched = search(sum_at, tried_at)
 
-    @jit(inline=True)
-    def start(t: ChainTables, s: ChainState, zero: int) -> None:
-        """Set the plays to the start memory, or all to 0, as `step.plays_of` does."""
-
     @jit
     def follow(t: ChainTables, s: ChainState, w: Scalar) -> Any:
         """Move the plays with their input w. Returns their sum."""
         m = t.moving
-        if plain(m):
-            loop_absorb(t.plays, s.plays, w)
-            return level(t, loop_output(t.plays, s.plays))
         if m.scanned:
             if s.own.moving[0]:
                 return level(t, relaxing_follow(m, t.plays, s.plays, w))
@@ -172,7 +189,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     def started(t: ChainTables, s: ChainState) -> Any:
         """The sum of the plays in the start memory."""
         m = t.moving
-        if m.scanned or plain(m):
+        if m.scanned:
             return level(t, loop_output(t.plays, s.plays))
         return level(t, moved_rest(t, s, s.plays.play[0]))
 
@@ -181,8 +198,6 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         """Input of the plays at which their sum is h."""
         m = t.moving
         total = asked(t, h)
-        if plain(m):
-            return solve(t.plays, s.plays, total)
         if m.scanned:
             if s.own.moving[0]:
                 return relaxing_input(m, t.plays, s.plays, total)

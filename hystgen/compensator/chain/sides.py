@@ -26,6 +26,7 @@ class Blocks(NamedTuple):
     target: Answer  # the output to reach, from the preview's line
     front: tuple[Answer, LimitedAnswer]  # forward, inverse
     plays: tuple[Action, Answer, Answer, Answer]  # start, follow, started, inverse input
+    moved: tuple[Action, Answer, Answer, Answer]  # the same if an effect moves or bends plays
     finer: Answer  # the signal in front of the plays, with bits below their input
     braked: Answer  # the reachable drive that keeps a lag from overshooting
     ramp: Callable[..., tuple[Scalar, Scalar]]  # a slew-limited drive one step later, and its rounding remainder
@@ -67,6 +68,8 @@ def side_of(every: Sequence[Verbs], side: Sequence[ChainPart], *verbs: str) -> I
         back = verb in ("resting", "solve")
         places = [PARTS.index(part) for part in (reversed(side) if back else side)]
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
+        if not found:
+            return _nothing
         made: Answer = _nothing
         for k, function in found:
             made = _then(made, k, function, back)

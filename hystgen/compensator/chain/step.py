@@ -13,13 +13,14 @@ import numpy as np
 
 from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, inside, jit
 from hystgen.basics.structures import Flag, Play, Reach, Real, Signal, Struct, UInt32, note
-from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
+from hystgen.compensator.chain.layout import ChainTables, Contents, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
 from hystgen.compensator.chain.preview import PreviewLine, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.part import Verbs
 from hystgen.effects.plays import FixedMovingTables, FixedSearchState, SearchState
 from hystgen.plays import loop
 from hystgen.plays.loop import State, loop_output
@@ -137,27 +138,44 @@ class Conversions(NamedTuple):
     shared: Answer  # a share of a signal
 
 
+@jit(inline=True)
+def same(t: object, x: Scalar, ascending: int) -> Scalar:  # noqa: ARG001  as with a memoryless part
+    """x itself: there is no memoryless part."""
+    return x
+
+
+@jit(inline=True)
+def same_inverse(t: object, x: Scalar, ascending: int) -> tuple[Scalar, int]:  # noqa: ARG001
+    """x itself, which nothing limits."""
+    return x, 0
+
+
 def made_of(
-    blocks: Blocks, codes: Conversions, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
-) -> tuple[Operations, Operations]:
-    """The operations of the forward operator and the inverse of models with effects in one arithmetic, with a user's
-    own blocks in front of the plays and behind."""
-    every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
+    blocks: Blocks, codes: Conversions, contents: Contents, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+) -> Operations:
+    """The operations of one operator of models with these contents in one arithmetic, with a user's own blocks in front
+    of the plays and behind. Numba compiles no branch that a constant from outside the function excludes."""
+    inverse, branches, maps, preview = contents.inverse, contents.branches, contents.maps, contents.preview
+    slew, braking, quiet, turning = contents.slew, contents.braked, contents.quiet, contents.turning
+    known = [blocks.verbs(part) for part in parts_with(drives, outputs)]
+    every = [verbs if has else Verbs(verbs.memory) for verbs, has in zip(known, contents.parts, strict=True)]
+    timed, aged = contents.parts[CLOCK], contents.parts[AGED]
+    still, lagging = inverse and quiet, inverse and turning
     blocks_reset, blocks_move = resetting(every), moves(every)
-    clock: Any = every[CLOCK]  # has all of the verbs below
+    clock: Any = known[CLOCK]  # has all of the verbs below
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
-    travelled_by = every[AGED].travelled
+    travelled_by = known[AGED].travelled
     assert travelled_by
     bent, unbent = blocks.bent
     preview_target = blocks.target
-    front_forward, front_inverse = blocks.front
-    start, follow, started, inverse_input = blocks.plays
+    front_forward, front_inverse = blocks.front if contents.front else (same, same_inverse)
+    start, follow, started, inverse_input = blocks.moved if contents.moving else blocks.plays
     finer, braked, ramp = blocks.finer, blocks.braked, blocks.ramp
-    led = every[LED].led
+    led = known[LED].led
     assert led
     led_state, led_solve, led_kept, led_absorb, led_missed, *_ = led
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
-    plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
+    plays_init, plays_reset, arrive, _ = plays_of(front_forward, front_inverse, loop_output)
 
     sent_rest, sent_absorb = side_of(every, SENT, "rest", "absorb")
     drive_side_rest, drive_side_absorb, drive_side_solve = side_of(every, AHEAD, "rest", "absorb", "solve")
@@ -168,18 +186,23 @@ def made_of(
     def displacement(t: ChainTables, s: ChainState, y: Scalar) -> Scalar:
         """The displacement: the result of the output side after saturation, plus the offsets."""
         offset: Scalar = t.number.output_offset[0] + s.own.offset[0]
-        for j in range(s.counts[CLOCK]):
-            offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
-        return bent(t.behind, y) + offset
+        if timed:
+            for j in range(s.counts[CLOCK]):
+                offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
+        return (bent(t.behind, y) if maps else y) + offset
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Scalar) -> tuple[Scalar, int]:
         """The result that the output side has to give for displacement u, and whether no such result exists."""
         offset = t.number.output_offset[0] + s.own.offset[0]
-        for j in range(s.counts[CLOCK]):
-            filled, moving = s.line.filled[0], s.own.moving[0]
-            offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
-        y, limited = unbent(t.behind, u - offset)
+        if timed:
+            for j in range(s.counts[CLOCK]):
+                filled, moving = s.line.filled[0], s.own.moving[0]
+                offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
+        y = u - offset
+        limited = 0
+        if maps:
+            y, limited = unbent(t.behind, y)
         return y, limited
 
     @jit(inline=True)
@@ -202,28 +225,27 @@ def made_of(
         """Whether a drive that should go back by `back` turns to the other branch, which is `way` away. If it leads a
         lag, it turns only if holding misses by more than the lag would in the first sample of a turn over `way`."""
         missed = back - t.plays.limits.hold[0]
-        if not t.turning:
-            return bool(missed > 0)
-        return bool(missed > led_missed(t.blocks[LED], -way if way < 0 else way))
+        if turning:
+            return bool(missed > led_missed(t.blocks[LED], -way if way < 0 else way))
+        return bool(missed > 0)
 
     # ---------------------------------------------------------------- chain_two_branches.c
 
     @jit
-    def branch_drive(t: ChainTables, s: ChainState, h: Scalar, w: Scalar) -> Scalar:
+    def branch_drive(t: ChainTables, s: ChainState, w: Scalar) -> Scalar:
         """The drive that gives w on the branch of its own move: it stays on its branch while it moves on or holds, and
         turns only to go back by more than rounding."""
-        if not t.plays.branches:
-            return inverse_drive(t.plays, s.plays, h, w)
-        up, drive = s.plays.step.ascending[0], s.plays.step.drive[0]
+        up, drive = s.plays.step.ascending[0] if branches else 1, s.plays.step.drive[0]
         v, limited = front_inverse(t.plays, w, up)
-        inside = clamp_drive(t.plays, v)
-        back = drive - inside if up else inside - drive
-        if back > 0:
-            v, limited = front_inverse(t.plays, w, 1 - up)
-            other = clamp_drive(t.plays, v)
-            fits = other < drive if up else other > drive
-            if not (fits and turns(t, back, other - inside)):
-                v = drive
+        if branches:
+            inside = clamp_drive(t.plays, v)
+            back = drive - inside if up else inside - drive
+            if back > 0:
+                v, limited = front_inverse(t.plays, w, 1 - up)
+                other = clamp_drive(t.plays, v)
+                fits = other < drive if up else other > drive
+                if not (fits and turns(t, back, other - inside)):
+                    v = drive
         if limited:
             s.plays.step.bits[0] |= DOMAIN
         return v
@@ -310,9 +332,9 @@ def made_of(
         s.plays.step.drive[0] = arriving(t, drive_signal(t, drive))
         s.own.applied[0] = drive
         a = drive_side_rest(t, s, drive_signal(t, drive))
-        if t.turning:
+        if lagging:
             steady_rest(t, s)
-        if t.quiet:
+        if still:
             quiet_rest(t, s, a)
         s.plays.step.level[0] = started(t, s)
         s.own.output[0] = output_side_rest(t, s, s.plays.step.level[0])
@@ -325,16 +347,16 @@ def made_of(
         if moving:
             travelled(t, s, v)
         x = drive_signal(t, reached)
-        steady = t.turning and s.own.inverse[0]
-        before = led_state(s.blocks[LED]) if steady else t.limits.zero[0]
+        before = led_state(s.blocks[LED]) if lagging else t.limits.zero[0]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
-        if steady and moving:
-            led_absorb(s.blocks[LED], before)
-            s.steady.moved[0] = s.steady.way[0]
-            s.steady.way[0] = t.limits.zero[0]
-        elif steady:
-            steady_rest(t, s)
-        if t.quiet:
+        if lagging:
+            if moving:
+                led_absorb(s.blocks[LED], before)
+                s.steady.moved[0] = s.steady.way[0]
+                s.steady.way[0] = t.limits.zero[0]
+            else:
+                steady_rest(t, s)
+        if still:
             s.quiet.arrived[0] = a
             if not moving:
                 quiet_rest(t, s, a)
@@ -361,8 +383,6 @@ def made_of(
     @jit
     def forward_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
         """The drive nearest to v that the amplifier reaches in one step; v itself in the first step."""
-        if not t.slew:
-            return v
         before, rest = s.reached.drive[0], s.reached.rest[0]
         drive, left = nearest_ramp(t, before, rest, v) if s.own.moving[0] else (v, t.limits.zero[0])
         s.reached.drive[0], s.reached.rest[0] = drive, left
@@ -375,11 +395,16 @@ def made_of(
         rest = s.reached.rest[0] if s.own.applied[0] == s.reached.drive[0] else t.limits.zero[0]
         return nearest_ramp(t, s.own.applied[0], rest, v)
 
+    @jit(inline=True)
+    def last_answer(t: ChainTables, s: ChainState) -> Scalar:  # noqa: ARG001  as with a slew limit
+        """The last answer again."""
+        return s.plays.step.answer[0] if s.plays.step.stepped[0] else s.own.applied[0]
+
     @jit
     def inverse_held(t: ChainTables, s: ChainState) -> Scalar:
         """The last answer again, or the drive nearest to it that the amplifier reaches in one step."""
-        last = s.plays.step.answer[0] if s.plays.step.stepped[0] else s.own.applied[0]
-        if not t.slew or not s.own.moving[0]:
+        last = last_answer(t, s)
+        if not s.own.moving[0]:
             return last
         s.reached.drive[0], s.reached.rest[0] = inverse_within(t, s, last)
         if s.reached.drive[0] != last:
@@ -391,12 +416,12 @@ def made_of(
     @jit
     def inverse_slewed(t: ChainTables, s: ChainState, v: Scalar) -> Scalar:
         """The reachable drive nearest to v, or the one from which a lag does not overshoot."""
-        if not t.slew or not s.own.moving[0]:
+        if not s.own.moving[0]:
             return v
         near, rest = inverse_within(t, s, v)
-        if t.blocks[LED].braked and not (t.quiet and s.quiet.equal[0] >= t.quiet):
+        if braking and not (t.quiet and s.quiet.equal[0] >= t.quiet):
             drive = braked(t, s, v, near)
-            if t.turning:
+            if turning:
                 drive = drive_code(t, steady_hold(t, s, drive_signal(t, drive)))
             near, rest = inverse_within(t, s, drive)
         s.reached.drive[0], s.reached.rest[0] = near, rest
@@ -406,9 +431,11 @@ def made_of(
     def forward_absorb(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v, after the delay and the amplifier's slew limit."""
         late = sent_absorb(t, s, v) if s.own.moving[0] else sent_rest(t, s, v)
-        reached = forward_slewed(t, s, late)
-        if reached != late:
-            s.plays.step.status[0] |= SLEW_LIMITED
+        reached = late
+        if slew:
+            reached = forward_slewed(t, s, late)
+            if reached != late:
+                s.plays.step.status[0] |= SLEW_LIMITED
         absorb(t, s, v, reached)
 
     @jit(inline=True)
@@ -425,17 +452,18 @@ def made_of(
     def inverse_put(t: ChainTables, s: ChainState, level: Scalar) -> Scalar:
         """Pass the next reference, already limited, through the preview if there is one. Returns the output to reach at
         this sample."""
-        if t.quiet:
+        if quiet:
             quiet_count(t, s, level_signal(t, level))
         wanted, limited = undisplaced(t, s, level_signal(t, level))
         if limited:
             s.plays.step.status[0] |= DOMAIN
-        if len(t.tap) == 0:
-            return wanted
-        for j in range(s.counts[CLOCK]):
-            clock_lead(t.blocks[CLOCK], s.blocks[CLOCK], j, s.line.filled[0])
-        preview_put(s.line, wanted)
-        return preview_target(t.tap, s.line)
+        if preview:
+            if timed:
+                for j in range(s.counts[CLOCK]):
+                    clock_lead(t.blocks[CLOCK], s.blocks[CLOCK], j, s.line.filled[0])
+            preview_put(s.line, wanted)
+            return preview_target(t.tap, s.line)
+        return wanted
 
     @jit(inline=True)
     def inverse_push(t: ChainTables, s: ChainState, u: Scalar) -> None:
@@ -451,8 +479,9 @@ def made_of(
 
     @jit(inline=True)
     def unread(t: ChainTables, s: ChainState) -> None:  # noqa: ARG001  the same call for every chain
-        """Repeat the newest reference instead of one that is not finite."""
-        preview_repeat(s.line)
+        """Repeat the newest reference of a preview instead of one that is not finite."""
+        if preview:
+            preview_repeat(s.line)
 
     @jit(inline=True)
     def stands(t: ChainTables, s: ChainState, u: Scalar) -> bool:  # noqa: ARG001
@@ -467,17 +496,19 @@ def made_of(
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
         s.plays.step.bits[0] = 0
         w = inverse_input(t, s, h)
-        a = finer(t, s, h, w, branch_drive(t, s, h, w))
+        a = finer(t, s, h, w, branch_drive(t, s, w))
         v = a
         if moving:
-            v = steady_drive(t, s, a) if t.turning else drive_side_solve(t, s, a)
-            if t.quiet:
+            v = steady_drive(t, s, a) if turning else drive_side_solve(t, s, a)
+            if quiet:
                 v = quiet_drive(t, s, a, v)
         v = drive_code(t, v)
-        reached = inverse_slewed(t, s, v)
-        if reached != v:
-            s.plays.step.bits[0] |= SLEW_LIMITED
-        return reached
+        if slew:
+            reached = inverse_slewed(t, s, v)
+            if reached != v:
+                s.plays.step.bits[0] |= SLEW_LIMITED
+            return reached
+        return v
 
     @jit
     def put_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
@@ -494,7 +525,7 @@ def made_of(
     def set_offset(t: ChainTables, s: ChainState, d: Scalar) -> None:
         """Set the offset of the displacement, and restart drift."""
         put_offset(t, s, d)
-        if finite(t, d):
+        if timed and finite(t, d):
             for j in range(s.counts[CLOCK]):
                 clock_reset(t.blocks[CLOCK], s.blocks[CLOCK], j)
 
@@ -526,26 +557,26 @@ def made_of(
         """Start from the present plays, after init (0) or reset (1)."""
         start(t, s, after)
         begin(t, s)
-        if not s.own.inverse[0]:
+        if not inverse:
             s.plays.step.answer[0] = expected(t, s)
 
     @jit(inline=True)
     def init(t: ChainTables, s: ChainState) -> None:
         """Set the start memory of the parameter file, and its settings."""
         settings_reset(t, s)
-        plays_init(t.plays, s.plays, s.own.inverse[0])
+        plays_init(t.plays, s.plays, inverse)
         start_at(t, s, 0)
 
     @jit(inline=True)
     def reset(t: ChainTables, s: ChainState) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        plays_reset(t.plays, s.plays, s.own.inverse[0])
+        plays_reset(t.plays, s.plays, inverse)
         start_at(t, s, 1)
 
     @jit(inline=True)
     def seen(t: ChainTables, s: ChainState, v: Scalar) -> None:
         """Absorb drive v in either operator."""
-        if s.own.inverse[0]:
+        if inverse:
             absorb(t, s, v, v)
         else:
             forward_absorb(t, s, v)
@@ -583,12 +614,15 @@ def made_of(
         elif call == OP_TRAVEL:
             set_travel(t, s, entered_travel(t, x))
         elif call == OP_TRAVELLED:
-            return travelled_by(s.blocks[AGED], 0)
+            if aged:
+                return travelled_by(s.blocks[AGED], 0)
         elif call == OP_CORRECT:
             correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
         return t.limits.zero[0]
 
-    hooks = Hooks(plays_in, finite, seen, shown, unread, inverse_held, stands, inverse_sought, other)
-    return operations_of(False, init, reset, seen, hooks), operations_of(True, init, reset, seen, hooks)
+    held = inverse_held if slew else last_answer
+    return operations_of(
+        inverse, init, reset, seen, Hooks(plays_in, finite, seen, shown, unread, held, stands, inverse_sought, other)
+    )

@@ -16,28 +16,10 @@ from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import targeting
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Conversions
-from hystgen.compensator.layout import FixedTables
 from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
 from hystgen.plays.slots import OUTPUT_CLAMPED
-
-# ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
-
-
-@jit
-def front_forward(t: FixedTables, a: int, ascending: int) -> int:
-    """Input of the plays for a signal in front of the memoryless part."""
-    return curve.front_forward(t, a, ascending) if t.fronts else a
-
-
-@jit
-def front_inverse(t: FixedTables, w: int, ascending: int) -> tuple[int, int]:
-    """The signal in front of the memoryless part for an input of the plays, and whether an envelope limited it."""
-    if t.fronts:
-        return curve.front_inverse(t, w, ascending)
-    return w, 0
-
 
 # ---------------------------------------------------------------- chain_finer.c or chain_whole.c
 
@@ -147,8 +129,8 @@ def ramp(before: int, rest: int, move: int, more: int) -> tuple[int, int]:
 
 
 BLOCKS = Blocks(
-    lambda part: part.fixed.verbs, (maps_forward, maps_inverse), targeting(paired), (front_forward, front_inverse),
-    moving_fixed.PLAYS, finer, braked, ramp,
+    lambda part: part.fixed.verbs, (maps_forward, maps_inverse), targeting(paired),
+    (curve.front_forward, curve.front_inverse), moving_fixed.UNMOVED, moving_fixed.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Conversions(

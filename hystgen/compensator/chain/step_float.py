@@ -83,7 +83,7 @@ def ramp(before: Scalar, rest: Scalar, move: Scalar, more: Scalar) -> tuple[Scal
 
 BLOCKS = Blocks(
     lambda part: part.floating.verbs, (bent, unbent), targeting(multiplied), (front_forward, front_inverse),
-    moving_float.PLAYS, finer, braked, ramp,
+    moving_float.UNMOVED, moving_float.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Conversions(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)
