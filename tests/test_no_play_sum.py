@@ -13,7 +13,7 @@ from recordings import brute_output, noisy
 import hystgen
 from hystgen.cascade import PI, Cascade
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import preparing
+from hystgen.diagnosis.data import preparing, signals
 from hystgen.diagnosis.search import forgetting, harm, hypothesis, screening, selection
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.model import Model
@@ -123,9 +123,9 @@ def test_play_sums_with_what_depends_on_time_are_play_sums(stage: Stage) -> None
 def test_moves_of_equal_length_at_two_speeds() -> None:
     slow, fast = records(plays, (100.0,))[:1], records(plays, (400.0,))[:1]
     ready = preparing.prepare(slow, slow, None, 0.0)
-    assert not forgetting.shows_speed(ready.to_fit)
+    assert not signals.shows_speed(ready.to_fit)
     ready = preparing.prepare(slow, fast, None, 0.0)
-    assert forgetting.shows_speed([*ready.to_fit, *ready.held])
+    assert signals.shows_speed([*ready.to_fit, *ready.held])
 
 
 def diagnosed(stage: Stage, speed: float) -> Diagnosis:

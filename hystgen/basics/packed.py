@@ -135,7 +135,8 @@ def _load_attribute(context, builder, kind, column, name):
     if name == "dtype":
         return context.get_dummy_value()
     if name == "shape":
-        width = builder.sdiv(stride, WORD(kind.dtype.itemsize))
+        rows = kind.dtype.shape  # of a member that is itself an array
+        width = WORD(rows[0]) if rows else builder.sdiv(stride, WORD(kind.dtype.itemsize))
         return context.make_tuple(builder, kind.attribute(name), [length, width])
     return builder.insert_value(column, builder.gep(data, [WORD(kind.dtype.fields[name][1])]), 0)
 

@@ -45,6 +45,9 @@ folder; the folder of the second is for a limit behind the plays."""
 
 FRONTS = BEND, LIMIT
 
+PARALLEL = "bouc_wen"
+"""Name of the effect that puts elements in parallel with the plays."""
+
 TOLD_APART = {
     frozenset(("creep", "drift")): "record holds of a minute after moves up and down: creep follows the last move",
     frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",

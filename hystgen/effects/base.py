@@ -154,6 +154,8 @@ class About:
     """whether the records' times are known"""
     output: tuple[float, float] = (0.0, 0.0)
     """smallest and largest measured output of all records"""
+    speeds: bool = True
+    """whether the drive covers equal distances in different times, so that travel is not time"""
 
 
 @dataclass(frozen=True)

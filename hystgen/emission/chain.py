@@ -232,7 +232,7 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         *[
             Field("play_t", "turned", "input of the elements in parallel with the plays at their last turn"),
             Field("bool", "upward", "their input has risen since"),
-            Field("element_t", "element", "", "HYSTGEN_ELEMENTS"),
+            Field("element_t", "element", "", str(t.elements)),
         ] * bool(t.elements),
         *[Field("search_t", "search", "for the input of the plays")] * (inverse and bool(t.bends)),
     ]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from hystgen.basics import arguments, names, parallel
 from hystgen.basics.problems import counted
 from hystgen.basics.progress import Progress
+from hystgen.effects import PARALLEL
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
@@ -160,7 +161,7 @@ def identify(
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         steps = [float(np.median(np.diff(record.t))) for record in fit_records]
         if model == "auto" and elements.shown(courses, steps):
-            kinds = (*kinds, gpi.PARALLEL)
+            kinds = (*kinds, PARALLEL)
         if held:
             tried = [_best(courses, held, kind, how) for kind in kinds]
             done = tried[_choose(tried)]

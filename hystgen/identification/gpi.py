@@ -18,7 +18,7 @@ from hystgen import effects
 from hystgen.effects.base import About, Effect
 from hystgen.front.stage import Stage
 from hystgen.identification import elements, faults, joint, pi, reduction, start
-from hystgen.identification.joint import DeadZones, Front, Kept, Parallel, Tanh, even_breaks
+from hystgen.identification.joint import DeadZones, Front, InParallel, Kept, Tanh, even_breaks
 from hystgen.identification.pi import DIGITS, IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.plays import operators
@@ -28,9 +28,6 @@ Tick = Callable[[int], None] | None
 
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be requested."""
-
-PARALLEL = "bouc_wen"
-"""Kind of a model with elements of this effect in parallel with the plays."""
 
 ROUNDS = 3
 """[searches] Number for the elements and the unknown starts of the records in turn. Set by: FIXME."""
@@ -182,7 +179,7 @@ def _finished(
     # the thresholds may have changed: find the best shape for them again
     r = fitted.solution.thresholds
     shaped = joint.refine(found.courses, front, shape, r, how.tick)
-    if isinstance(front, Parallel):
+    if isinstance(front, InParallel):
         begun, shaped = _with_approaches(found.courses, front, shaped, r, how.tick)
         courses = [replace(item, approach=each.approach) for item, each in zip(courses, begun, strict=True)]
     shape = shaped.shape
@@ -198,7 +195,7 @@ def _finished(
 
 
 def _with_approaches(
-    courses: Sequence[Course], front: Parallel, shaped: joint.LocalFit, thresholds: Array, tick: Tick
+    courses: Sequence[Course], front: InParallel, shaped: joint.LocalFit, thresholds: Array, tick: Tick
 ) -> tuple[list[Course], joint.LocalFit]:
     """The courses with the approaches of their first samples, and the shape found with them.
 
@@ -224,10 +221,10 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
     drive = (min(item.drive_range[0] for item in courses), max(item.drive_range[1] for item in courses))
     if kind == "gpi-tanh":
         return [Tanh(drive), Tanh(drive, 2)]
-    if kind == PARALLEL:
+    if kind == effects.PARALLEL:
         about = _about(courses, drive)
-        shapes = [each for shape in effects.shapes(PARALLEL) for each in shape.candidates(about)]
-        return [Parallel(each) for each in sorted(shapes, key=lambda each: (each.beyond != "", len(each.start)))]
+        shapes = [each for shape in effects.shapes(effects.PARALLEL) for each in shape.candidates(about)]
+        return [InParallel(each) for each in sorted(shapes, key=lambda each: (each.beyond != "", len(each.start)))]
     if isinstance(breaks, tuple):
         if not all(drive[0] < place < drive[1] for place in breaks):
             raise IdentificationError(
@@ -254,7 +251,7 @@ def _shaped(
     """The best result of several starts, and the courses with their approaches; `before`: the fronts tried before this
     one."""
     starts = [front.straight]
-    if isinstance(front, Parallel):
+    if isinstance(front, InParallel):
         return _in_parallel(courses, front, thresholds, before, tick)
     if isinstance(front, Tanh) and front.branches == 2 and before:
         starts = [front.doubled(before[-1].shape)]
@@ -267,12 +264,12 @@ def _shaped(
 
 
 def _in_parallel(
-    courses: Sequence[Course], front: Parallel, thresholds: Array, before: Sequence[_Found], tick: Tick
+    courses: Sequence[Course], front: InParallel, thresholds: Array, before: Sequence[_Found], tick: Tick
 ) -> tuple[list[Course], joint.LocalFit]:
     """The best elements, from those of the simpler candidate that they contain, or from the best of several starts."""
     candidate = front.candidate
     starts = (candidate.start, *candidate.others)
-    simpler = {each.front.candidate.label: each.shape for each in before if isinstance(each.front, Parallel)}
+    simpler = {each.front.candidate.label: each.shape for each in before if isinstance(each.front, InParallel)}
     if candidate.grown is not None and candidate.beyond in simpler:
         starts = (candidate.grown(simpler[candidate.beyond]),)
     if len(starts) > 1:

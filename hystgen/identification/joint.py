@@ -315,7 +315,7 @@ class Tanh(_Alone):
 
 
 @dataclass(frozen=True)
-class Parallel(_Bounded):
+class InParallel(_Bounded):
     """Elements in parallel with the plays, and no stage; the shape is the candidate's parameters."""
 
     candidate: Candidate

@@ -102,7 +102,8 @@ class Contents(NamedTuple):
     """What the functions of one operator of a chain compute; as in the C, there is no code for anything else.
 
     `parts`: which of `parts.PARTS` have blocks; `front`, `branches`: there is a memoryless part, with two branches;
-    `maps`: there are maps of the output; `moving`: an effect moves or bends plays, or joins them; the others as in `ChainTables`.
+    `maps`: there are maps of the output; `moving`: an effect moves, bends or joins plays; the others as in
+    `ChainTables`.
     """
 
     inverse: bool

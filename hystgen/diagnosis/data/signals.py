@@ -181,6 +181,23 @@ def reversals(v: Array) -> Places:
     return _moves(v)[1]
 
 
+def shows_speed(items: Sequence[Item]) -> bool:
+    """Whether the drive takes different times for about equal distances between turns."""
+    moves = [np.empty((0, 2))]
+    for item in items:
+        at = reversals(item.run.v)
+        moves.append(np.abs(np.column_stack([np.diff(item.run.v[at]), np.diff(item.run.t[at])])))
+    length, seconds = np.concatenate(moves).T
+    order = np.argsort(length, kind="stable")
+    length, seconds = length[order], seconds[order]
+    last = np.searchsorted(length, (1.0 + acceptance.LOOP_ENDS) * length, side="right").tolist()
+    return any(
+        float(np.max(seconds[k:end])) > acceptance.LOOP_SPEEDS * float(seconds[k])
+        or float(seconds[k]) > acceptance.LOOP_SPEEDS * float(np.min(seconds[k:end]))
+        for k, end in enumerate(last)
+    )
+
+
 def unresolved_edges(v: Array) -> NDArray[np.bool_]:
     """Samples at which the drive jumps from one level to the next; its course between these samples is unknown.
 

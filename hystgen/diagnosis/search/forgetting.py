@@ -1,15 +1,14 @@
 """Whether the hysteresis departs from a play sum: minor loops stay open and depend on the past, at any speed.
 
 A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget gradually
-as the drive travels. If the search has not named `bouc_wen`, one such element may still show that the hysteresis is of
-this kind: it is fitted in parallel with the plays, judged by the rules for names except that much may remain, and only
-reported. At a single speed, travel and time are equivalent: the element can then replace creep, a lag or a rate
-dependence, and vice versa.
+as the drive travels. If the search has not named elements in parallel with the plays, one such element may still show
+that the hysteresis is of this kind: it is fitted beside the effects found, judged by the rules for names, and only
+reported. At a single speed, travel and time are equivalent, so the search does not try elements: this one can then
+replace creep, a lag or a rate dependence, and vice versa.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -17,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import signals
-from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.items import rms
 from hystgen.diagnosis.findings.kinds import NotAPlaySum
 from hystgen.diagnosis.search import acceptance, fits, ranges, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried
 from hystgen.diagnosis.search.selection import Outcome, Refusal
-from hystgen.effects.base import Candidate
-from hystgen.effects.bouc_wen.model import BoucWenElements
+from hystgen.effects import PARALLEL, shapes
+from hystgen.effects.base import Candidate, Effect
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -61,7 +60,7 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records) or now.actuator.joining:
         return None
-    shown = shows_speed([*records.to_fit, *records.held])
+    shown = signals.shows_speed([*records.to_fit, *records.held])
     names = tuple(dict.fromkeys(each.name for each in outcome.found))
     for base, replaced in _bases(outcome, records):
         alone = _element(base, records)
@@ -118,32 +117,15 @@ def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> O
     return Outcome(outcome.refitted, smaller, tuple(chain), ranked, ends=ends, written=selection.EXTENDED)
 
 
-def shows_speed(items: Sequence[Item]) -> bool:
-    """Whether the drive takes different times for about equal distances between turns."""
-    moves = []
-    for item in items:
-        at = signals.reversals(item.run.v)
-        for a, b in itertools.pairwise(at):
-            moves.append((abs(float(item.run.v[b] - item.run.v[a])), float(item.run.t[b] - item.run.t[a])))
-    moves.sort()
-    widest = moves[-1][0] if moves else 0.0
-    for k, (length, seconds) in enumerate(moves):
-        for other, more in moves[k + 1 :]:
-            if other - length > acceptance.LOOP_ENDS * min(length, widest):
-                break
-            if max(seconds, more) > acceptance.LOOP_SPEEDS * min(seconds, more):
-                return True
-    return False
-
-
 def _element(now: Fitted, records: Records) -> Tried:
     """The hypothesis with the element, started at the best of several widths and fitted well enough for ranking."""
     low, high = records.known.drive
     wide, slope = high - low, records.known.output_range / (high - low)
 
-    def build(x: Array) -> BoucWenElements:
+    def build(x: Array) -> Effect:
         weights, widths = (slope * float(x[0]),), (wide * float(10.0 ** x[1]),)
-        return BoucWenElements(name="bouc_wen", weights=weights, widths=widths, balance=float(x[2]))
+        entry = {"name": PARALLEL, "weights": weights, "widths": widths, "balance": float(x[2])}
+        return shapes(PARALLEL)[0].model_validate(entry)
 
     ends = np.log10(WITHIN)
     starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], STARTS)]
@@ -153,7 +135,7 @@ def _element(now: Fitted, records: Records) -> Tried:
     )
 
     def structure(part: Candidate) -> Structure:
-        return replace(now.structure, parts=(*now.structure.parts, Part("bouc_wen", part)))
+        return replace(now.structure, parts=(*now.structure.parts, Part(PARALLEL, part)))
 
     def amount(start: Array) -> fits.Search:
         shape = np.concatenate([now.shape, start])
@@ -163,8 +145,8 @@ def _element(now: Fitted, records: Records) -> Tried:
     whole = structure(candidate)
     fitted = fits.begun(whole, records.quick, begun.now.shape, begun.now.best).further(STEPS).found(now.weights)
     errors = fitted.errors(records.held)
-    option = Option(candidate.label, "bouc_wen", whole, whole, tuple(starts))
-    return Tried(option, fitted, ("bouc_wen",), rms(errors), errors)
+    option = Option(candidate.label, PARALLEL, whole, whole, tuple(starts))
+    return Tried(option, fitted, (PARALLEL,), rms(errors), errors)
 
 
 def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
@@ -191,13 +173,12 @@ def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> boo
 
 def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> NotAPlaySum:
     element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
-    assert isinstance(element, BoucWenElements)
     low, high = records.known.drive
-    width, gap = element.widths[0] / (high - low), _open(tried.fitted, element, low, high)
+    width, gap = element.model_dump()["widths"][0] / (high - low), _open(tried.fitted, element, low, high)
     return NotAPlaySum(records.residual(now), tried.held_out, width, gap, names, shown)
 
 
-def _open(fitted: Fitted, element: BoucWenElements, low: float, high: float) -> float:
+def _open(fitted: Fitted, element: Effect, low: float, high: float) -> float:
     """Gap left by a minor loop in the middle of the drive range, as a fraction of its height; 0 with plays alone."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)

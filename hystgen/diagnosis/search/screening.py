@@ -81,6 +81,7 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
         frozenset(columns),
         timed=all(item.timed for item in items),
         output=(min(float(y.min()) for y in outputs), max(float(y.max()) for y in outputs)) if outputs else (0.0, 0.0),
+        speeds=signals.shows_speed(items),
     )
 
 

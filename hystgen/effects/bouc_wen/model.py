@@ -137,7 +137,8 @@ class BoucWenElements(_ParallelElements):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One element with any balance, then with any exponent as well; tried if Dahl's element helps."""
+        """One element with any balance, then with any exponent as well; tried if Dahl's element helps; none
+        at a single speed, at which effects of time explain as much."""
 
         def build(x: Array) -> BoucWenElements:
             weights, widths = _elements(x[None, :2], about)
@@ -151,7 +152,8 @@ class BoucWenElements(_ParallelElements):
             straight = _candidate(label, 1, build, more[:count])
             return replace(straight, beyond=DAHL, grown=lambda x: np.append(x, more[:count, 2]))
 
-        return [freed("bouc_wen, any balance", 1), freed("bouc_wen, any balance and exponent", 2)]
+        free = [freed("bouc_wen, any balance", 1), freed("bouc_wen, any balance and exponent", 2)]
+        return free if about.speeds else []
 
 
 class DahlElements(_ParallelElements):
@@ -169,7 +171,7 @@ class DahlElements(_ParallelElements):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One element, and two if one helps."""
+        """One element, and two if one helps; none at a single speed."""
 
         def build(x: Array) -> DahlElements:
             weights, widths = _elements(x.reshape(-1, 2), about)
@@ -180,10 +182,11 @@ class DahlElements(_ParallelElements):
             return np.array([0.5 * x[0], one, 0.5 * x[0], other])
 
         none = np.empty((0, 3))
-        return [
+        found = [
             _candidate(DAHL, 1, build, none),
             replace(_candidate("bouc_wen, two dahl", 2, build, none), beyond=DAHL, grown=grown),
         ]
+        return found if about.speeds else []
 
 
 def _elements(x: Array, about: About) -> tuple[tuple[float, ...], tuple[float, ...]]:
