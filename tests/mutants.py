@@ -402,7 +402,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "", "viscous", "float32"),
     ("the line of references stands", "effects/delay/preview.c", "line[i + 1u] : x", "line[i] : x", "late", "float32"),
     ("a reference is repeated that was never given", "effects/delay/preview.c", "    if (*filled) {",
-     "    if (line != 0) {", "late", "float32"),
+     "    if (*filled || HYSTGEN_TAPS > 0u) {", "late", "float32"),
     ("a preview loses its last tap", "effects/delay/preview.c",
      "i = 1; i < HYSTGEN_TAPS", "i = 1; i + 1u < HYSTGEN_TAPS", "late", "float32"),
     ("a preview loses its last tap, fixed", "effects/delay/preview.c", "i = 1; i < HYSTGEN_TAPS",
