@@ -338,9 +338,7 @@ class _InUnits:
         self._lsb: tuple[float, float] | None = None
         chosen = FIXED.get(options.arithmetic)
         if chosen:
-            emit = model.parameters.emit
-            lsbs = fixed_tables.lsbs(model.cascade, options.arithmetic, emit.drive_lsb, emit.output_lsb)
-            drive, output = map(float, lsbs)
+            drive, output = model.units_per_code(options.arithmetic, options.engine)
             self._lsb = (output, drive) if options.operator == "inverse" else (drive, output)
             self._most = chosen.code_max
         self._code = 0

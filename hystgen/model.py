@@ -255,6 +255,16 @@ class Model:
         how = self.parameters.emit.compensation
         return chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb, engine)
 
+    def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:
+        """Drive and output units per code in a fixed-point arithmetic. Raises FormatError."""
+        from hystgen.compensator import fixed_tables
+
+        codes = self.compiled(arithmetic, engine).codes if self.effects else None
+        if codes is not None:
+            return float(codes.drive_lsb), float(codes.output_lsb)
+        drive, output = fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
+        return float(drive), float(output)
+
     @property
     def _lsb(self) -> tuple[float | None, float | None]:
         return self.parameters.emit.drive_lsb, self.parameters.emit.output_lsb

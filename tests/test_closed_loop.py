@@ -466,6 +466,29 @@ def test_compiled_float64_gives_the_bits_of_the_reference(compiler: str | None) 
     check_inverse(compiled, error_bounds(within(STAGE, compiled.drive), "float64", "corners").rounding)
 
 
+@pytest.mark.parametrize("effect", [
+    "name: creep, time_constants: [0.01], weights: [0.3]",
+    "name: bouc_wen, weights: [0.06], widths: [9.0]",
+    "name: bouc_wen, weights: [-0.015], widths: [9.0]",
+])  # fmt: skip
+@pytest.mark.parametrize("operator", ["forward", "inverse"])
+def test_effects_that_change_the_output_range_change_its_codes(effect: str, operator: str) -> None:
+    """In fixed point too, the whole range is reached, in physical units, as in double precision."""
+    stage = Model(parse_parameters(
+        "hystgen: 1\nname: s\ninput_range: [0, 100]\nsample_time: 1.0e-3\n"
+        f"model: {{pi: {{thresholds: [0, 5], weights: [0.04, 0.01]}}, effects: [{{{effect}}}]}}\n"
+    ))  # fmt: skip
+    k = np.arange(1500)
+    v = np.concatenate([[0.0], 50.0 - 50.0 * np.cos(0.02 * k) * (1.0 - k / 3000.0)])
+    y = stage.simulate(v)
+    given, wanted = (v, y) if operator == "forward" else (y, v)
+    compiled = CompiledC(stage, operator, "q31")
+    compiled.reset()
+    found = np.array([compiled.step(x) for x in given.tolist()])
+    assert np.max(np.abs(found - wanted)) < 1e-7 * np.ptp(wanted)
+
+
+
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", ["listed", "two_branches"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])

@@ -265,7 +265,7 @@ class TestAuto:
         w, z = plant(front, 4)
         fit = hystgen.identify(record(v, y, "a"), model="auto", holdout=[record(w, z, "b")])
         rows = [row for row in fit.rows if row.part == "candidate"]
-        assert [row.model.partition(",")[0] for row in rows] == ["pi", "gpi-deadzone", "gpi-tanh"]
+        assert [row.model.partition(",")[0] for row in rows] == ["pi", "gpi-deadzone", "gpi-tanh", "bouc_wen"]
         assert {row.records for row in rows} == {("b",)}
         (chosen,) = [row for row in fit.rows if row.part == "held out"]
         assert chosen.rms == next(row.rms for row in rows if row.model == kind)
@@ -275,7 +275,7 @@ class TestAuto:
     def test_without_held_out_records_the_ends_tell(self) -> None:
         v, y = plant(bent, 3)
         fit = hystgen.identify(record(v, y), model="auto")
-        assert [row.part for row in fit.rows] == ["candidate"] * 3 + ["fit", "held out", "all"]
+        assert [row.part for row in fit.rows] == ["candidate"] * 4 + ["fit", "held out", "all"]
         assert fit.parameters.model.memoryless[0].kind == "dead_zone"
         assert "candidate" in fit.table()
         assert "candidate" in fit.text()

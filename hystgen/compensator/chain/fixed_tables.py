@@ -225,8 +225,12 @@ class _Builder:
     @property
     def _beside(self) -> float:
         """By how much contributions differ from the plays, with elements in parallel counted as a difference of all."""
-        elements = moving.largest_parallel(self.static, self.parts.plays) / math.fsum(map(abs, self.static.pi.weights))
-        return moving.largest_bend(self.static, self.parts.plays) + elements
+        return moving.largest_bend(self.static, self.parts.plays) + self._elements
+
+    @property
+    def _elements(self) -> float:
+        """Largest sum of the elements in parallel with the plays, as a change of all plays, input units."""
+        return moving.largest_parallel(self.static, self.parts.plays) / math.fsum(map(abs, self.static.pi.weights))
 
     @cached_property
     def _unlimited(self) -> tuple[float, float]:
@@ -292,7 +296,8 @@ class _Builder:
 
     def _numbers(self) -> FixedChainNumbers:
         span = self.inner.drive[1] - self.inner.drive[0]
-        drive_bits, most = self.inner.fine + self.finer, self._farthest + math.ceil(self.bumps.largest)
+        drive_bits, beside = self.inner.fine + self.finer, self.bumps.largest + self._elements / float(self.inner.step)
+        most = self._farthest + math.ceil(beside)
         common = (
             self.signal(self.static.output_offset), self.signal(self.high - self.low), *self.slew(span),
             round(VERIFIED_SHARE * (self.about.code_max + 1)), (1 << drive_bits) + math.ceil(lead(self.leading)),
