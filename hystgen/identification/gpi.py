@@ -29,12 +29,13 @@ Tick = Callable[[int], None] | None
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be requested."""
 
-ROUNDS = 3
-"""[searches] Number for the elements and the unknown starts of the records in turn. Set by: FIXME."""
+ROUNDS = 2
+"""[searches] Number for the elements and the unknown starts of the records in turn. Set by: the Dahl and Bouc-Wen
+plants of `examples/compensate_plants.py`, without and with noise of 0.1 %: 1, 2 and 3 find the same to 1e-6 %."""
 
-FIRST_STEPS = 3
+FIRST_STEPS = 2
 """[steps] Number taken from each start of the elements: the first finds their weights, which begin at 0. The best start
-is then searched to the end. Set by: FIXME."""
+is then searched to the end. Set by: the same plants, which are found with 1, 2, 3 and 5."""
 
 BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks tried for a dead-zone sum."""
