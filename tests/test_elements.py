@@ -139,7 +139,7 @@ def play_sum(v: Array) -> Array:
     return brute_output(v, *PLAYS, 0.0)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 1e-3])
 @pytest.mark.parametrize("plant", [play_sum, lagging, creeping, curved])
 def test_other_plants_get_no_element(plant: Plant, noise: float) -> None:
     assert not identified(plant, noise).parameters.model.effects

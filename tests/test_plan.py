@@ -16,7 +16,7 @@ from modelfiles import head
 
 import hystgen
 from benchmarks.plants.__main__ import main as plants
-from benchmarks.plants.effects import catalogue
+from benchmarks.plants.case import in_turn
 from hystgen import effects
 from hystgen.basics.problems import PlanError
 from hystgen.planning import waveforms
@@ -274,7 +274,7 @@ class TestSeparation:
     def test_the_hidden_effect_is_named_first(self, tmp_path: Path, name: str) -> None:
         found = made(tmp_path)
         found.write(tmp_path / "plan")
-        seed = sorted(catalogue()).index(name)
+        seed = in_turn().index(name)
         words = ["generate", "--block", "tune", "--kind", "single", "--seeds", str(seed), "--no-rivals"]
         words += ["--drives", str(tmp_path / "plan"), "-o", str(tmp_path)]
         assert not plants([*words, *(word for d in found.drives if d.held_out for word in ("--holdout", d.name))])

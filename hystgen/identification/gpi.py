@@ -29,6 +29,10 @@ Tick = Callable[[int], None] | None
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be requested."""
 
+PROMISING = 0.95
+"""[fraction of the error with plays alone] Further elements are tried only if the simplest leave at most this on blocks
+left out of the fit, far more than `auto` accepts. Set by: the run time of `auto`."""
+
 ROUNDS = 2
 """[searches] Number for the elements and the unknown starts of the records in turn. Set by: the Dahl and Bouc-Wen
 plants of `examples/compensate_plants.py`, without and with noise of 0.1 %: 1, 2 and 3 find the same to 1e-6 %."""
@@ -149,8 +153,13 @@ def _solved(
     fine = plain.thresholds
     if not isinstance(how.wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
+    alone = math.inf
+    if kind == effects.PARALLEL:
+        alone = validation(joint.refine(compared, Kept(), Kept().straight, fine, how.tick), Kept())
     found: list[_Found] = []
     for front in fronts_of(kind, compared, how.breaks):
+        if found and found[0].error > PROMISING * alone:  # the simplest elements do not help
+            break
         begun, shaped = _shaped(compared, front, fine, found, how.tick)
         found.append(_Found(front, shaped.shape, validation(shaped, front), begun))
     return [_finished(courses, each, plain, how) for each in choose(found)]
