@@ -63,6 +63,10 @@ ANALYSED = (
     ("braked", "q31", "loop"),
     ("creeping", "float32", "corners"),
     ("led", "q31", "corners"),
+    ("forgetful", "float32", "loop"),
+    ("forgetful", "q31", "loop"),
+    ("gliding", "float32", "loop"),
+    ("gliding", "q15", "loop"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""
