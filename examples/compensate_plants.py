@@ -256,7 +256,7 @@ def row(result: Result) -> list[str]:
     numbers = [result.held_out, *result.scaled, *result.compensated, result.fixed_point[0]]
     traits = [result.place, result.history, result.open_loop]
     return [
-        result.case.name, result.model, str(result.plays), *(f"{x:.2g}" for x in numbers),
+        result.case.name, result.model, str(result.plays), *(f"{max(x, LEAST):.2g}" for x in numbers),
         *(f"{x:.2g}" if x >= 0.05 else "0" for x in traits), result.case.remark,
     ]  # fmt: skip
 

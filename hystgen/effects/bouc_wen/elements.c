@@ -136,7 +136,8 @@ static void hystgen_element_unload(hystgen_element_t *e) {
 
 /* Turns an element at the distance x since its last turn: z/width changes its sign. */
 static void hystgen_element_turn(hystgen_element_t *e, int64_t x) {
-    const int64_t last = hystgen_piece[HYSTGEN_PIECES - 1u].level;
+    const unsigned int end = HYSTGEN_PIECES - 1u;
+    const int64_t last = hystgen_piece[end].level;
     const int64_t s = hystgen_element_at(e, x);
     e->s = -s;
     if (s > last) {
@@ -195,7 +196,8 @@ static hystgen_real_t hystgen_gained(const hystgen_element_t *e, hystgen_real_t 
     if (x < e->until) {
         return hystgen_polynomial(e->c, x, slope);
     }
-    const hystgen_real_t *piece = hystgen_piece[hystgen_piece_at(0, e->place + x)];
+    const unsigned int i = hystgen_piece_at(0, e->place + x);
+    const hystgen_real_t *piece = hystgen_piece[i];
     const hystgen_real_t h = e->place + x - piece[0];
     return piece[1] + hystgen_polynomial(&piece[2], h, slope) - e->level;
 }
@@ -236,7 +238,8 @@ static void hystgen_element_unload(hystgen_element_t *e) {
 /* Turns an element at the distance x since its last turn: z/width changes its sign, exactly, with a
    rounding remainder. */
 static void hystgen_element_turn(hystgen_element_t *e, hystgen_real_t x) {
-    const hystgen_real_t last = hystgen_piece[HYSTGEN_PIECES - 1u][1];
+    const unsigned int end = HYSTGEN_PIECES - 1u;
+    const hystgen_real_t last = hystgen_piece[end][1];
     hystgen_real_t slope;
     const hystgen_real_t more = hystgen_gained(e, x, &slope);
     const hystgen_real_t high = e->high + more;
