@@ -641,23 +641,26 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
         }
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize(("compiler", "layout"), [
-    ("gcc", cost.Layout(integer=4, pointer=8, packed=False)),
-    ("arm-none-eabi-gcc", cost.CORE_32),
-    ("avr-gcc", cost.AVR),
+LAYOUTS = {
+    "gcc": cost.Layout(integer=4, pointer=8, packed=False),
+    "arm-none-eabi-gcc": cost.CORE_32,
+    "avr-gcc": cost.AVR,  # has no double, and so no float64
+}
+
+
+@pytest.mark.parametrize(("compiler", "arithmetic"), [
+    (compiler, arithmetic)
+    for compiler in LAYOUTS for arithmetic in ARITHMETICS if (compiler, arithmetic) != ("avr-gcc", "float64")
 ])  # fmt: skip
-def test_sizes_of_types_of_effects_are_the_compilers(
-    arithmetic: str, compiler: str, layout: cost.Layout, tmp_path: Path
-) -> None:
+def test_sizes_of_types_of_effects_are_the_compilers(compiler: str, arithmetic: str, tmp_path: Path) -> None:
     """The banner computes sizes from declarations; compilers, on the header that is written from them."""
     if not shutil.which(compiler):
+        if os.environ.get("CI"):
+            pytest.fail(f"CI installs {compiler}, but it is not there")
         pytest.skip(f"{compiler} is not installed")
-    if compiler == "avr-gcc" and arithmetic == "float64":
-        pytest.skip("an AVR has no double")
     family = replace(runtime.FAMILIES[arithmetic], chain=True)
     pieces = declarations.pieces(family.kind)
-    sizes = cost.sizes(pieces, family, layout, {})
+    sizes = cost.sizes(pieces, family, LAYOUTS[compiler], {})
     assert len(pieces) > 20
     checks = [
         f"_Static_assert(sizeof({piece.name}) == {sizes[piece.name.removeprefix('hystgen_')][0]}, \"{piece.name}\");"
