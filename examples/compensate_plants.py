@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 SAMPLES = 1500  # length of one part of a record
 STEP = 1e-3  # seconds from sample to sample
-LEAST = 1e-4  # smallest error shown in the table, %: below it, the rounding of the linear algebra shows
+LEAST = 1e-4  # [%] smallest error shown: smaller ones differ between machines by the rounding of linear algebra
 
 PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]])  # thresholds and weights
 

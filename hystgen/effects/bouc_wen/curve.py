@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 
 NEAR = 0.25
 """[widths] Up to this distance from 0 a half is a power series in `c d^n`, which no Taylor series about 0 replaces for
-broken n; beyond, it is a Taylor series in each cell."""
+fractional n; beyond, it is a Taylor series in each cell. The last of the `TERMS` is then below 1e-17 for the steepest
+law (balance 4, exponents 1, 1.2 and 2); with 0.5 it reaches 4e-5."""
 
 TERMS = 30
 """Coefficients of the series near 0. Set by: `test_bouc_wen::test_the_curve_is_its_equation`."""
