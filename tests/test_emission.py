@@ -641,7 +641,7 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
         }
 
 
-LAYOUTS = {
+CORES = {
     "gcc": cost.Layout(integer=4, pointer=8, packed=False),
     "arm-none-eabi-gcc": cost.CORE_32,
     "avr-gcc": cost.AVR,  # has no double, and so no float64
@@ -650,7 +650,7 @@ LAYOUTS = {
 
 @pytest.mark.parametrize(("compiler", "arithmetic"), [
     (compiler, arithmetic)
-    for compiler in LAYOUTS for arithmetic in ARITHMETICS if (compiler, arithmetic) != ("avr-gcc", "float64")
+    for compiler in CORES for arithmetic in ARITHMETICS if (compiler, arithmetic) != ("avr-gcc", "float64")
 ])  # fmt: skip
 def test_sizes_of_types_of_effects_are_the_compilers(compiler: str, arithmetic: str, tmp_path: Path) -> None:
     """The banner computes sizes from declarations; compilers, on the header that is written from them."""
@@ -660,7 +660,7 @@ def test_sizes_of_types_of_effects_are_the_compilers(compiler: str, arithmetic: 
         pytest.skip(f"{compiler} is not installed")
     family = replace(runtime.FAMILIES[arithmetic], chain=True)
     pieces = declarations.pieces(family.kind)
-    sizes = cost.sizes(pieces, family, LAYOUTS[compiler], {})
+    sizes = cost.sizes(pieces, family, CORES[compiler], {})
     assert len(pieces) > 20
     checks = [
         f"_Static_assert(sizeof({piece.name}) == {sizes[piece.name.removeprefix('hystgen_')][0]}, \"{piece.name}\");"
