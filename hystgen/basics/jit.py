@@ -21,14 +21,18 @@ import functools
 import hashlib
 import importlib.util
 import inspect
+import itertools
 import types
 from collections.abc import Callable, Iterator
-from typing import Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import extras
+
+if TYPE_CHECKING:
+    from hystgen.basics.packed import Packed
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -113,18 +117,28 @@ class Jit(Generic[P, R]):
         self.py_func = function
         self.targetoptions = {**OPTIONS, "inline": "always" if inline else "never"}
         """numba's options, which numba reads when another function calls this one"""
+        self._packed: dict[int, Packed] = {}
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
         if _plain.get():
             return self.interpreted(*given, **named)
         if _has_numba():
-            from hystgen.basics.packed import Packed
-
-            passed = [Packed(each) if isinstance(each, tuple) and hasattr(each, "_fields") else each for each in given]
-            return self.entry(*passed, **named)  # type: ignore[no-any-return]
+            return self.entry(*map(self._passed, itertools.count(), given), **named)  # type: ignore[no-any-return]
         _announce(interpreted)
         with plain():
             return self.interpreted(*given, **named)
+
+    def _passed(self, place: int, given: object) -> object:
+        """An argument as compiled code takes it. A call for each sample passes the same tables and memory, whose words
+        take ten times as long to write as a sample to compute; they are kept until others come."""
+        if not (isinstance(given, tuple) and hasattr(given, "_fields")):
+            return given
+        from hystgen.basics.packed import Packed
+
+        last = self._packed.get(place)
+        if last is None or last.kept[0] is not given:
+            last = self._packed[place] = Packed(given)
+        return last
 
     @functools.cached_property
     def interpreted(self) -> Callable[P, R]:
