@@ -86,15 +86,16 @@ class World:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
             residual=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
-            compared=1.0, terms=lambda now, _: [now],
+            compared=1.0, terms=lambda now, _: [now], at_rest=lambda *_: [],
         )  # fmt: skip
 
 
 TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
 
 RECORDS: Any = SimpleNamespace(
-    to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0, terms=lambda now, _: [now]
-)
+    to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0, terms=lambda now, _: [now],
+    at_rest=lambda *_: [],
+)  # fmt: skip
 """Records of which only the errors left by each option are known."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from recordings import brute_output
 
 from hystgen.diagnosis import run
+from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings.result import AtEnd
 from hystgen.diagnosis.search import fits, ranges, screening, selection
@@ -78,7 +80,7 @@ def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(
     """A first effect must remove 0.6 times what it leaves, a further one as much; neither leaves less than noise."""
     held, fitted = (NOISE, left * NOISE) if of_fitted else (left * NOISE, NOISE)
     now: Any = SimpleNamespace(bare=bare, errors=lambda _: [np.full(4, fitted)])
-    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: held, to_fit=[])
+    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: held, to_fit=[], held=[], at_rest=lambda *_: [])
     assert selection.leaves_enough(now, records) is (left > enough)
 
 
@@ -105,6 +107,80 @@ def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_m
     further = selection._step(step.best.fitted, world.gap(now), world.records)
     assert further is not None
     assert (further.merit is None) is (one_loop and one_speed)
+
+
+HOLDS = slice(0, 400)
+"""The samples of each made-up record in which the drive stands still."""
+
+
+class InHolds(Made):
+    """An option that leaves an error of 1 but in the holds, where it leaves `held_out` or `fitted` times the noise."""
+
+    def __init__(self, name: str, held_out: float, fitted: float) -> None:
+        super().__init__(name, 1, (1.0, 1.0))
+        self.in_holds = fitted, held_out
+
+    def errors(self, items: Sequence[int], like: Any = None) -> list[Array]:
+        found = super().errors(items, like)
+        for item, error in zip(items, found, strict=True):
+            error[HOLDS] *= self.in_holds[item in HELD] * NOISE
+        return found
+
+
+def at_rest(errors: list[Array], _: int) -> list[Array]:
+    return [error[HOLDS] for error in errors]
+
+
+WITH_HOLDS: Any = SimpleNamespace(**vars(RECORDS), **{"gap": 1.0, "residual": lambda _: 1.0})
+WITH_HOLDS.at_rest = at_rest
+
+
+@pytest.mark.parametrize(
+    ("before", "held_out", "fitted", "named"),
+    [
+        (3.0, 1.0, 1.0, True),
+        (3.0, 1.5, 1.5, True),  # more than noise, but most of what moves is explained
+        (2.0, 1.6, 1.0, False),  # neither
+        (5.0, 2.2, 1.0, False),  # far above the noise
+        (5.0, 1.0, 2.2, False),
+        (1.1, 1.0, 1.0, False),  # hardly anything moves
+    ],
+)
+def test_what_moves_while_the_drive_stands_still(before: float, held_out: float, fitted: float, named: bool) -> None:
+    """The error of the hysteresis, 50 times the noise, hides the effect everywhere else."""
+    now, better = InHolds("now", before, before), InHolds("better", held_out, fitted)
+    best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 1.0, better.errors(HELD))  # type: ignore[arg-type]
+    merit = selection.merit_of(now, best, WITH_HOLDS)  # type: ignore[arg-type]
+    assert (merit is not None) is named
+    if merit is not None:
+        assert merit.worth(1.0, WITH_HOLDS)
+    assert selection.merit_of(now, best, RECORDS) is None, "without holds there is nothing to tell it by"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("left", "more"), [(1.1, False), (1.3, True)])
+def test_what_moves_in_holds_is_reason_enough_to_go_on(left: float, more: bool) -> None:
+    """Elsewhere, only noise is left."""
+    now: Any = SimpleNamespace(bare=False, errors=lambda items: [np.full(400, left * NOISE) for _ in items])
+    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: NOISE, to_fit=TO_FIT, held=HELD, at_rest=at_rest)
+    assert selection.leaves_enough(now, records) is more
+
+
+@pytest.mark.parametrize(("left", "way"), [(1.1, True), (2.0, False)])
+def test_an_effect_does_not_give_way_to_one_that_leaves_more_in_holds(left: float, way: bool) -> None:
+    """The other one has fewer parameters and leaves as much everywhere else."""
+    now, other = InHolds("now", 1.0, 1.0), InHolds("other", left, left)
+    now.actuator = SimpleNamespace(nuisances=lambda _: np.ones((3, 1)))
+    best = screening.Tried(SimpleNamespace(name="other"), other, ("other",), 1.0, other.errors(HELD))  # type: ignore[arg-type]
+    assert selection._gives_way(now, "one", best, WITH_HOLDS) is way  # type: ignore[arg-type]
+
+
+def test_holds_of_records() -> None:
+    """Of a staircase, the last three fifths of each level, less their mean; ramps belong to no hold."""
+    levels = np.repeat([0.0, 1.0, 0.4], 100)
+    v = np.concatenate([levels, np.linspace(0.4, 1.0, 100)])
+    item = Item("record", Run(0.01 * np.arange(400.0), v, {}), np.zeros(400), None, 1.0)
+    found = signals.settled(item)
+    assert [(hold.start, hold.stop) for hold in found] == [(40, 100), (140, 200), (240, 301)]
 
 
 @pytest.mark.parametrize(("held_out", "open_"), [(0.02, []), (0.3, ["b"])])
@@ -290,8 +366,9 @@ def made(name: str, free: int, left: tuple[float, float]) -> screening.Tried:
 
 
 OF_MADE: Any = SimpleNamespace(
-    to_fit=TO_FIT, held=HELD, noise=NOISE, residual=lambda each: float(np.sqrt(np.mean(np.square(each.errors(HELD)))))
-)
+    to_fit=TO_FIT, held=HELD, noise=NOISE, at_rest=lambda *_: [],
+    residual=lambda each: float(np.sqrt(np.mean(np.square(each.errors(HELD))))),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,12 @@ def still(v: Array, least: int) -> list[tuple[int, int]]:
     return found
 
 
+def settled(item: Item) -> list[slice]:
+    """The samples of each hold of a record after settling."""
+    share, holds = acceptance.HOLD_SETTLING, still(item.run.v, acceptance.HOLD_SAMPLES)
+    return [slice(first + int(share * (last - first)), last) for first, last in holds]
+
+
 def stands_within(v: Array) -> float:
     """Largest sample-to-sample change of a drive at rest: measurement noise, or one converter code."""
     swing = float(np.ptp(v))

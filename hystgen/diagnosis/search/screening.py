@@ -213,6 +213,8 @@ class Records:
     """whether the fitted records follow their loops in the same time"""
     compared: float
     """fraction of the recorded samples that are compared"""
+    holds: tuple[list[list[slice]], list[list[slice]]]
+    """the settled samples of each hold, of held-out and of fitted records"""
 
     @classmethod
     def of(
@@ -232,7 +234,13 @@ class Records:
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(),
             signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
+            (list(map(signals.settled, held)), list(map(signals.settled, to_fit))),
         )
+
+    def at_rest(self, errors: Sequence[Array], group: int) -> list[Array]:
+        """The errors in each settled hold less their mean; `group`: 0 for held-out records, 1 for fitted ones."""
+        parts = [error[hold] for error, holds in zip(errors, self.holds[group], strict=True) for hold in holds]
+        return [part - np.nanmean(part) for part in parts if np.isfinite(part).any()]
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
         """A hypothesis, and a copy whose weights are refitted with the free start states of another one.

@@ -47,12 +47,15 @@ class Merit:
     remaining: float
     """fraction of the held-out rms that remains"""
     p_value: float
+    at_rest: bool = False
+    """whether it explains what moves while the drive stands still"""
 
     def worth(self, gap: float, records: Records) -> bool:
         """Whether it removes enough of the gap, or of the error before it, to deserve a name."""
         of_gap = acceptance.NAME_SHARE
         return (
-            self.removed >= of_gap * gap
+            self.at_rest
+            or self.removed >= of_gap * gap
             or self.fitted >= of_gap * records.gap
             or self.remaining <= acceptance.NEARLY_ALL
         )
@@ -87,7 +90,8 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     An effect has no merit if chance explains the difference, if it removes too little to stand out from the noise, if
     it hardly shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it
     is a limit that acts only at the very end of the drive range, or if it does not level off within the records.
-    However few events show an effect, chance does not halve an error to which nothing was fitted.
+    However few events show an effect, chance does not halve an error to which nothing was fitted. However much other
+    causes leave, an effect has merit if it alone explains what moves while the drive stands still.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -105,17 +109,20 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         return slow
     held, fitted = _removed(now, best, records)
     needed = _least(now) if least is None else least
-    if not _enough(held, fitted, needed, records.noise):
+    at_rest = all(_explains_rest(each, k, records) for k, each in enumerate((held, fitted)))
+    if not (at_rest or _enough(held, fitted, needed, records.noise)):
         short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
         return Refusal("little", short.removed, needed * max(records.noise, short.left))
     p_value = difference(held.without, held.errors)
+    if at_rest:
+        return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
     if p_value > acceptance.P_REPEATED and held.left > acceptance.FAR_LESS * rms(held.without):
         return Refusal("chance", p_value, acceptance.P_REPEATED)
     if p_value > acceptance.P_SURE:
         of_fitted = difference(fitted.without, fitted.errors)
         if of_fitted > acceptance.P_SURE:
             return Refusal("unsure", of_fitted, acceptance.P_SURE)
-    return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value)
+    return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
 
 
 @dataclass(frozen=True)
@@ -143,6 +150,23 @@ def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Rem
     )
 
 
+def _explains_rest(removed: _Removed, group: int, records: Records) -> bool:
+    """Whether an effect leaves only noise, and removes more, of what moves while the drive stands still; `group`: 0 for
+    held-out records, 1 for fitted ones.
+
+    Rate-independent hysteresis of any kind keeps its output while the drive keeps its value, so that within a hold the
+    error of a model with the wrong hysteresis is constant.
+    """
+    without, errors = (records.at_rest(each, group) for each in (removed.without, removed.errors))
+    if not errors:
+        return False
+    before, left, noise = rms(without), rms(errors), records.noise
+    if not (is_noise(left, noise) or (left <= acceptance.FAR_ABOVE_NOISE * noise and takes_most(left, before, noise))):
+        return False
+    enough = apart(before, left) >= acceptance.FIRST_REMOVES * noise
+    return enough and difference(without, errors) <= acceptance.P_SURE
+
+
 def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
     """Whether an effect removes enough from held-out or from fitted records, and shows in both.
 
@@ -162,9 +186,14 @@ def _least(now: Fitted) -> float:
 
 
 def leaves_enough(now: Fitted, records: Records) -> bool:
-    """Whether an effect that removed all of the held-out or of the fitted error except noise could be named."""
+    """Whether an effect that removed all of the held-out or of the fitted error except noise could be named, or all
+    that moves while the drive stands still."""
     most = max(records.residual(now), rms(now.errors(records.to_fit)))
-    return most > acceptance.above_noise(_least(now)) * records.noise
+    if most > acceptance.above_noise(_least(now)) * records.noise:
+        return True
+    at_rest = [records.at_rest(now.errors(items), k) for k, items in enumerate((records.held, records.to_fit))]
+    least = acceptance.above_noise(acceptance.FIRST_REMOVES) * records.noise
+    return all(len(each) > 0 and rms(each) > least for each in at_rest)
 
 
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
@@ -885,6 +914,8 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     not separate, the one with fewer parameters stands, since more parameters can follow another effect; of two shapes
     of one effect, whose name is not in question, the one with the smaller error stands.
     """
+    if _worse_at_rest(now, best, records):
+        return False
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
     if fewer != 0 and name != best.name:
@@ -901,6 +932,15 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     if near and fewer >= 0 and better(best.fitted, now, every):
         return True
     return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
+
+
+def _worse_at_rest(now: Fitted, other: Tried, records: Records) -> bool:
+    """Whether another hypothesis leaves more of what moves while the drive stands still."""
+    for k, items in enumerate((records.held, records.to_fit)):
+        ours, theirs = (records.at_rest(each.errors(items), k) for each in (now, other.fitted))
+        if ours and not no_worse(rms(theirs), rms(ours), records.noise):
+            return True
+    return False
 
 
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
