@@ -125,8 +125,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow", INVERSE,
-        ": m->here.k == 0 &&",
-        ":",
+        "    } else if (m->here.k == 0) {",
+        "    } else {",
         "plain", "float32",
     ),
     Mutant(

@@ -42,6 +42,7 @@ THREE = chain(
 MODELS = {**FILES, **CHAINS, "three": THREE}
 KINDS = (
     ("plain", "both", "float32", "loop"), ("plain", "both", "q31", "loop"), ("plain", "both", "q15", "corners"),
+    ("plain", "both", "float32", "corners"),
     ("bent", "both", "float32", "corners"), ("bent", "both", "float32", "loop"), ("curved", "both", "q31", "corners"),
     ("two_branches", "both", "float32", "loop"), ("two_branches", "both", "float32", "corners"),
     ("two_branches", "both", "q31", "loop"), ("three", "inverse", "float32", "loop"),
