@@ -49,7 +49,7 @@ KINDS = (
     ("three", "both", "q31", "loop"), ("quick", "both", "float32", "loop"), ("late", "both", "float32", "loop"),
     ("warm", "both", "q31", "loop"), ("heated", "inverse", "q15", "loop"), ("drifting", "inverse", "float32", "loop"),
     ("lagging", "both", "float32", "corners"), ("dashpot", "both", "float32", "loop"),
-    ("everything", "both", "q31", "loop"),
+    ("everything", "both", "q31", "loop"), ("quick", "inverse", "q31", "loop"), ("bumpy", "inverse", "q31", "loop"),
 )  # fmt: skip
 
 
