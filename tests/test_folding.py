@@ -42,13 +42,14 @@ THREE = chain(
 MODELS = {**FILES, **CHAINS, "three": THREE}
 KINDS = (
     ("plain", "both", "float32", "loop"), ("plain", "both", "q31", "loop"), ("plain", "both", "q15", "corners"),
+    ("plain", "both", "float32", "corners"),
     ("bent", "both", "float32", "corners"), ("bent", "both", "float32", "loop"), ("curved", "both", "q31", "corners"),
     ("two_branches", "both", "float32", "loop"), ("two_branches", "both", "float32", "corners"),
     ("two_branches", "both", "q31", "loop"), ("three", "inverse", "float32", "loop"),
     ("three", "both", "q31", "loop"), ("quick", "both", "float32", "loop"), ("late", "both", "float32", "loop"),
     ("warm", "both", "q31", "loop"), ("heated", "inverse", "q15", "loop"), ("drifting", "inverse", "float32", "loop"),
     ("lagging", "both", "float32", "corners"), ("dashpot", "both", "float32", "loop"),
-    ("everything", "both", "q31", "loop"),
+    ("everything", "both", "q31", "loop"), ("quick", "inverse", "q31", "loop"), ("bumpy", "inverse", "q31", "loop"),
 )  # fmt: skip
 
 

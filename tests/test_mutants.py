@@ -105,6 +105,12 @@ def finds(mutant: Mutant, folder: Path) -> None:
     assert any(row.different for row in report.rows), report.table()
 
 
+def test_every_mutant_changes_its_file(sources: Path) -> None:
+    """Also those that only a run of everything emits and compiles."""
+    for mutant in (*mutants.KILLED, *mutants.OF_EFFECTS, *mutants.EQUIVALENT):
+        assert (sources / mutant.file).read_text().count(mutant.old) == mutant.count, mutant.what
+
+
 @pytest.mark.parametrize("mutant", mutants.KILLED, ids=lambda mutant: mutant.what)
 def test_verify_finds_a_mutant(mutant: Mutant, sources: Path) -> None:
     finds(mutant, sources)

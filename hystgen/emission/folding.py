@@ -205,9 +205,10 @@ class _Folding:
         if function.own and does == "":
             self._calls(function.name, functools.partial(self._spliced, function))
             return
-        if not function.own or function.before.startswith(self._apart):
-            return
         answered = does.removeprefix("return ").removesuffix(";")
+        apart = function.before.startswith(self._apart) and answered not in function.names  # an argument takes no stack
+        if not function.own or apart:
+            return
         places = sum(1 for _ in self._given(function.name))
         if ";" not in answered and does != answered and (places == 1 or _forwards(answered)):
             self._calls(function.name, functools.partial(self._put, function, answered))

@@ -48,11 +48,13 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
     const bool on =
         m->here.rising ? hystgen_above(x, m->here.input) : hystgen_above(m->here.input, x);
-    const bool same =
-        on ? (m->here.rising ? hystgen_above(m->next, x) : hystgen_above(x, m->next))
-           : m->here.k == 0 &&
-                 (m->here.rising ? hystgen_above(x, m->behind) && hystgen_above(m->here.input, x)
-                                 : hystgen_above(m->behind, x) && hystgen_above(x, m->here.input));
+    bool same = false;
+    if (on) {
+        same = m->here.rising ? hystgen_above(m->next, x) : hystgen_above(x, m->next);
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? hystgen_above(x, m->behind) && hystgen_above(m->here.input, x)
+                              : hystgen_above(m->behind, x) && hystgen_above(x, m->here.input);
+    }
     if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 644bb5750c151e9f7063f70c641af1ce62e2fd05093bbd35baeea3ae7bad2f9a, without this line
+ * Text: sha256 ab9c03afdfce7b7ce6956ae23d3d5680826f38121c8ba47c23634dbcfddc6059, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -376,10 +376,13 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
     const bool on = m->here.rising ? plain_above(x, m->here.input) : plain_above(m->here.input, x);
-    const bool same = on ? (m->here.rising ? plain_above(m->next, x) : plain_above(x, m->next))
-        : m->here.k == 0 &&
-            (m->here.rising ? plain_above(x, m->behind) && plain_above(m->here.input, x)
-        : plain_above(m->behind, x) && plain_above(x, m->here.input));
+    bool same = false;
+    if (on) {
+        same = m->here.rising ? plain_above(m->next, x) : plain_above(x, m->next);
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? plain_above(x, m->behind) && plain_above(m->here.input, x)
+            : plain_above(m->behind, x) && plain_above(x, m->here.input);
+    }
     if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
