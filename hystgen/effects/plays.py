@@ -102,6 +102,7 @@ class MovingNumbers(Struct):
     one: Literal
     rate: Real = note("reciprocal of the sum's mean slope")
     close: Real = note("distance of the sum at which a search ends")
+    smooth: Real = note("the same if no play starts or stops to follow on the way")
     standing_share: Real = note("share of a step after which the input is taken as standing still")
 
 
@@ -163,10 +164,13 @@ E = TypeVar("E", ElementState, FixedElementState)
 
 
 class ElementsState(NamedTuple, Generic[E]):
-    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); each element."""
+    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); in floating point, the
+    input to which a search has led and the sum of the plays there (1,); each element."""
 
     turned: Reals
     upward: Counts
+    found: Reals
+    asked: Reals
     element: E
 
 
@@ -186,7 +190,8 @@ class ElementTables(NamedTuple):
     def memory(self) -> ElementsState[ElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
         dtype = self.piece.dtype
-        return ElementsState(np.zeros(1, dtype), np.ones(1, np.int64), ElementState.zeros(len(self.element), dtype))
+        turned, found, asked = np.zeros((3, 1), dtype)
+        return ElementsState(turned, np.ones(1, np.int64), found, asked, ElementState.zeros(len(self.element), dtype))
 
 
 class FixedElementTables(NamedTuple):
@@ -202,7 +207,8 @@ class FixedElementTables(NamedTuple):
 
     def memory(self) -> ElementsState[FixedElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        return ElementsState(np.zeros(1, np.int64), np.ones(1, np.int64), FixedElementState.zeros(len(self.element)))
+        turned, found, asked = np.zeros((3, 1), np.int64)
+        return ElementsState(turned, np.ones(1, np.int64), found, asked, FixedElementState.zeros(len(self.element)))
 
 
 class MovingTables(NamedTuple):
@@ -366,13 +372,15 @@ class PlaysPart(Generic[T, F]):
 
 class ParallelTerms(NamedTuple):
     """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
-    input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
-    error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
-    fixed point for steps of the input and of the sum; `coded_error`: bound on the error of their sum there."""
+    input (`steepest`), and of that per change of the input (`bend`); `memory`: the elements in double precision;
+    `tables`: their constants in a data type; `error`: bound on the error of their sum in a data type, in the C (True)
+    or of the law in double precision; `coded`: their constants in fixed point for steps of the input and of the sum;
+    `coded_error`: bound on the error of their sum there."""
 
     weights: Array
     most: Array
     steepest: Array
+    bend: Array
     memory: ElementsInDouble
     tables: Callable[[Any], ElementTables]
     error: Callable[[Any, bool], float]

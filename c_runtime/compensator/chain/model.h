@@ -143,6 +143,8 @@ typedef struct {
     unsigned int released;
     hystgen_play_t turned;
     bool upward;
+    hystgen_play_t found;
+    hystgen_signal_t asked;
     hystgen_element_t element[HYSTGEN_ELEMENTS];
     hystgen_search_t search;
 #else

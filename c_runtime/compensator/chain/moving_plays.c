@@ -285,26 +285,42 @@ HYSTGEN_APART hystgen_sum_t hystgen_with_staying(unsigned int i, const hystgen_p
     return sum;
 }
 
-/* The plays move while their input moves to w. Returns their sum. */
-HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
-                                                 hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+/* The plays move while their input moves to w. */
+static void hystgen_moved_on(hystgen_play_t *play, hystgen_sum_t *bent, hystgen_play_t w) {
     unsigned int i;
     HYSTGEN_ROLLED
 #ifdef HYSTGEN_HAS_ORDERED_PLAYS
     for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_move(i, play, play[0], w); ++i) {
         (void)hystgen_bent_anew(i, play[i], bent);
     }
+#else
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (hystgen_move(i, play, play[0], w)) {
+            (void)hystgen_bent_anew(i, play[i], bent);
+        }
+    }
+#endif
+    play[0] = w;
+}
+
+/* The same. Returns their sum. */
+HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
+                                                 hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+#ifdef HYSTGEN_HAS_ORDERED_PLAYS
+    hystgen_moved_on(play, bent, w);
     sum = hystgen_with_staying(1, play, bent, sum);
 #else
+    unsigned int i;
+    HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (hystgen_move(i, play, play[0], w)) {
             (void)hystgen_bent_anew(i, play[i], bent);
         }
         sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);
     }
-#endif
     play[0] = w;
+#endif
     return sum;
 }
 
@@ -331,23 +347,49 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
+#ifdef HYSTGEN_HAS_ELEMENTS
+/* Plays and elements move while their input moves to w. Updates their sum, unless a search has just
+   led there. */
+static void hystgen_operator_join(hystgen_operator_t *self, hystgen_sum_t *bent, hystgen_play_t w) {
+    hystgen_sum_t slope;
+#ifdef HYSTGEN_INVERSE
+    const bool turned = hystgen_operator_elements(self, w);
+    const bool known = !(turned || w < self->found || w > self->found);
+    self->found = HYSTGEN_LARGEST_INPUT;
+    hystgen_moved_on(self->play, bent, w);
+    if (known) {
+        self->level = self->asked;
+        return;
+    }
+#else
+    (void)hystgen_operator_elements(self, w);
+    hystgen_moved_on(self->play, bent, w);
+#endif
+    self->level = hystgen_with_staying(1, self->play, bent, hystgen_model_tables.weight[0] * w);
+    self->level = self->level + hystgen_operator_joined(self, w, &slope);
+}
+#endif
+
 /* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t *bent = hystgen_operator_bent(self);
-#ifdef HYSTGEN_HAS_ELEMENTS
-    hystgen_sum_t slope;
-    (void)hystgen_operator_elements(self, w);
-#endif
     if (self->moving) {
-        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
 #ifdef HYSTGEN_HAS_ELEMENTS
-        self->level = self->level + hystgen_operator_joined(self, w, &slope);
+        hystgen_operator_join(self, bent, w);
+#else
+        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
 #endif
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
 #endif
     } else {
+#ifdef HYSTGEN_HAS_ELEMENTS
+        (void)hystgen_operator_elements(self, w);
+#ifdef HYSTGEN_INVERSE
+        self->found = HYSTGEN_LARGEST_INPUT;
+#endif
+#endif
 #ifdef HYSTGEN_INVERSE
         self->search.slope = hystgen_model_tables.weight[0];
 #endif

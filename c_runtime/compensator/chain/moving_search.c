@@ -16,6 +16,18 @@ static bool hystgen_inverse_turns(hystgen_inverse_t *self, hystgen_signal_t h) {
     }
     return turns;
 }
+
+#ifndef HYSTGEN_FIXED
+/* Slope of the sum right after a turn, when no play follows. */
+static hystgen_real_t hystgen_inverse_turned_slope(const hystgen_inverse_t *self) {
+    hystgen_real_t slope = hystgen_model_tables.weight[0];
+    unsigned int j;
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        slope = slope + hystgen_element_weight[j] * self->element[j].c[0];
+    }
+    return slope;
+}
+#endif
 #endif
 
 #ifdef HYSTGEN_FIXED
@@ -158,6 +170,7 @@ static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_inverse_tries(self, at, i); ++i) {
     }
+    at->first = i;
     at->sum = hystgen_with_staying(i, self->play, bent, at->sum);
 #else
     HYSTGEN_ROLLED
@@ -185,6 +198,26 @@ static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slo
     }
     return left * rate;
 }
+
+#if defined(HYSTGEN_HAS_ELEMENTS) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
+/* Whether one more step along the slope leads from the input tried to the solution: the elements
+   bend little on the way, and no play starts or stops to move. Goes there. */
+static bool hystgen_inverse_lands(const hystgen_inverse_t *self, hystgen_attempt_t *at) {
+    const hystgen_real_t left = at->asked - at->sum;
+    const hystgen_real_t from = at->input;
+    const unsigned int first = at->first;
+    if (!(left < HYSTGEN_SMOOTH && left > -HYSTGEN_SMOOTH) || !self->moving) {
+        return false;
+    }
+    at->input = from + hystgen_led(left, at->slope);
+    if ((first == 1u || hystgen_tried(self, at, first - 1u)) &&
+        (first > HYSTGEN_N_PLAYS || !hystgen_tried(self, at, first))) {
+        return true;
+    }
+    at->input = from;
+    return false;
+}
+#endif
 
 /* Goes on from try k to the next input: by the slope there, if it leads to an input inside the
    interval and k is not too large; else to the middle. A wrong slope costs only tries. Returns
@@ -233,7 +266,9 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hyst
     hystgen_attempt_t at;
     unsigned int k;
 #ifdef HYSTGEN_HAS_ELEMENTS
-    (void)hystgen_inverse_turns(self, h);
+    if (hystgen_inverse_turns(self, h)) {
+        self->search.slope = hystgen_inverse_turned_slope(self);
+    }
 #endif
     at.low = HYSTGEN_LEAST_INPUT;
     at.high = HYSTGEN_LARGEST_INPUT;
@@ -244,8 +279,19 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hyst
     at.steady = at.slope;
     for (k = 0; !hystgen_inverse_solves(&at, k); ++k) {
         hystgen_inverse_try(self, &at);
+#if defined(HYSTGEN_HAS_ELEMENTS) && defined(HYSTGEN_HAS_PLAIN_PLAYS)
+        if (hystgen_inverse_lands(self, &at)) {
+            break;
+        }
+#endif
     }
     self->search.slope = at.steady;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    if (k < HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES) { /* the sum there is h but for rounding */
+        self->found = at.input;
+        self->asked = h;
+    }
+#endif
     return at.input;
 }
 #endif

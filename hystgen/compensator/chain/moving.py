@@ -197,8 +197,17 @@ def closeness(
         return left / (off + 4.0 * unit)
     p = np.abs(static.pi.weights)
     steep = 1.0 + steepest_bend(static, effects)
-    jumps = float(np.sum(p[1:])) * steep * varies[0] + most * (math.pow(off, 2.0**turns) + 8.0 * unit)
+    jumps = float(np.sum(p[1:])) * steep * varies[0]
     bend = float(np.sum(p[1:])) * (steep * varies[1] + sharpest_bend(static, effects))
+    return smoothness(left, slopes, (jumps, bend), unit, turns)
+
+
+def smoothness(left: float, slopes: tuple[float, float], varies: tuple[float, float], unit: float, turns: int) -> float:
+    """Largest error of the sum from which one more step, with the slope at its start, leaves at most `left`, if the
+    slope changes by at most `varies`, J, and M per change of the input, as in `closeness`."""
+    least, most = slopes
+    off = (most - least) / (most + least)
+    jumps, bend = varies[0] + most * (math.pow(off, 2.0**turns) + 8.0 * unit), varies[1]
     return least * 2.0 * left / (jumps + math.sqrt(jumps * jumps + 2.0 * bend * left))
 
 
@@ -296,6 +305,9 @@ def build(
         number["close"] = closeness(static, effects, ends, unit, turns, varies)
         if (room := number["close"] - sum_rounding(static, effects, unit)) > 0.0:  # a narrower interval is not needed
             halves = min(halves, math.ceil(math.log2(3.0 * (high - low) * ends[1] / room)))
+        if joined and moves == at.PLAIN and kind == at.STRAIGHT:
+            bend = math.fsum(float(np.abs(each.weights) @ each.bend) for each in joined)
+            number["smooth"] = smoothness(residual(static, effects, unit), ends, (0.0, bend), unit, turns)
     alike = kind == at.STRAIGHT and not joined and len(set(first[1:].tolist())) == 1
     scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])

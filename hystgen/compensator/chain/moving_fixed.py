@@ -30,7 +30,7 @@ def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
     return w + step if left > 0 else w - step
 
 
-def search(sum_at: Callable[..., int], _: object) -> Answer:
+def search(sum_at: Callable[..., int], *_: object) -> Answer:
     """The search of `moving_search.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
@@ -94,11 +94,24 @@ def begin(s: ChainState, _: Reals) -> None:
 
 
 @jit(inline=True)
+def found(m: FixedMovingTables, s: ChainState, w: int) -> bool:  # noqa: ARG001  as in floating point
+    """False: a sum is exact, so that it does not matter where it was computed."""
+    return False
+
+
+@jit(inline=True)
+def turned(t: FixedChainTables, s: ChainState) -> None:
+    """Leave the rate of the last search."""
+
+
+@jit(inline=True)
 def ordered(_: FixedMovingTables) -> bool:
     """Whether a sum assumes that plays behind the first stationary one are stationary too: no, each is checked."""
     return False
 
 
-KIND = Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered)
+KIND = Kind(
+    level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, found, turned, ordered
+)
 PLAYS = operators(KIND)
 UNMOVED = unmoved(KIND)

@@ -81,6 +81,7 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
     weights, widths = np.array(effect.weights), np.array(effect.widths)
     most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
     steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
+    bend = exponent * max(1.0, 2.0 * balance - 1.0) * steepest / widths  # as |s| <= 1
 
     def polynomials(dtype: Any) -> CurvePieces:
         return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
@@ -101,7 +102,7 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
     return ParallelTerms(
-        weights, most * widths, steepest, LoadedElements(effect), tables, error,
+        weights, most * widths, steepest, bend, LoadedElements(effect), tables, error,
         lambda step, unit: coded[0]()(effect, step, unit), lambda: coded[1]()(effect),
     )
 
