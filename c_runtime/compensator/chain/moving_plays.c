@@ -15,7 +15,29 @@ static inline hystgen_sum_t hystgen_operator_way(const hystgen_operator_t *self,
     return self->upward ? rise : -rise;
 }
 
-/* The elements turn at the present input of the plays. */
+#ifdef HYSTGEN_FIXED
+/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
+   at rest: along the slope at a place near w (`hystgen_operator_approach`). */
+static inline hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
+                                                    hystgen_play_t w) {
+    return self->moving ? self->joined + self->slope * ((hystgen_sum_t)w - self->near) : 0;
+}
+
+/* The elements depart from the input w, where this is their sum, in a new direction. */
+static void hystgen_operator_depart(hystgen_operator_t *self, hystgen_play_t w, hystgen_sum_t sum) {
+    unsigned int j;
+    self->near = w;
+    self->joined = sum;
+    self->slope = 0;
+    self->departs = true;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        self->slope += hystgen_element_turned(j, &self->element[j]);
+    }
+}
+#endif
+
+/* The elements turn at the present input of the plays. Their sum goes on from there. */
 HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
     const hystgen_sum_t way = hystgen_operator_way(self, self->play[0]);
     unsigned int j;
@@ -23,30 +45,39 @@ HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
         hystgen_element_turn(&self->element[j], hystgen_element_distance(j, way));
     }
+#ifdef HYSTGEN_FIXED
+    hystgen_operator_depart(self, self->play[0], hystgen_operator_joined(self, self->play[0]));
+#endif
     self->turned = self->play[0];
     self->upward = !self->upward;
 }
 
 #ifdef HYSTGEN_FIXED
-/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
-   at rest. */
-HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
-                                                    hystgen_play_t w) {
+/* Computes the sum of the elements at w, and its slope, unless it has been computed near w since
+   they departed. */
+HYSTGEN_APART void hystgen_operator_approach(hystgen_operator_t *self, hystgen_play_t w) {
+    const hystgen_sum_t on = (hystgen_sum_t)w - self->near;
     const hystgen_sum_t way = hystgen_operator_way(self, w);
     hystgen_sum_t sum = 0;
     unsigned int j;
-    if (!self->moving) {
-        return 0;
+    if (!self->moving || on == 0 ||
+        (!self->departs && on <= HYSTGEN_STRAIGHT && on >= -HYSTGEN_STRAIGHT)) {
+        return;
     }
+    self->near = w;
+    self->departs = false;
+    self->slope = 0;
     HYSTGEN_ROLLED
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
-        sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way));
+        sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way),
+                                    &self->slope);
     }
-    return self->upward ? sum : -sum;
+    self->joined = self->upward ? sum : -sum;
 }
+
 #else
-/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
-   at rest. Sets its slope. */
+/* Sum of the elements after their input has moved on to w, in the direction in which they move,
+   or at rest. Sets its slope. */
 HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
                                                     hystgen_play_t w, hystgen_sum_t *slope) {
     const hystgen_sum_t way = hystgen_operator_way(self, w);
@@ -85,6 +116,9 @@ static bool hystgen_operator_elements(hystgen_operator_t *self, hystgen_play_t w
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
         hystgen_element_unload(&self->element[j]);
     }
+#ifdef HYSTGEN_FIXED
+    hystgen_operator_depart(self, w, 0);
+#endif
     return false;
 }
 #endif
@@ -186,15 +220,22 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 #else
     if (!self->moving || w != self->search.input) {
 #endif
+#ifdef HYSTGEN_HAS_ELEMENTS
+        hystgen_operator_approach(self, w);
+#endif
         hystgen_operator_release(self, w);
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);
     }
     self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+    self->steep = self->moving ? self->steep : 0;
+#endif
     hystgen_operator_move(self, w, self->search.found);
 #else
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_operator_elements(self, w);
+    hystgen_operator_approach(self, w);
 #endif
     hystgen_operator_release(self, w);
     hystgen_operator_move(self, w, hystgen_operator_sum(self, w));
@@ -234,6 +275,7 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     unsigned int i;
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_operator_elements(self, w);
+    hystgen_operator_approach(self, w);
     sum += hystgen_operator_joined(self, w);
 #endif
     HYSTGEN_ROLLED

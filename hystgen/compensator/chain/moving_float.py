@@ -14,7 +14,9 @@ from hystgen.plays.loop import loop_solve
 from hystgen.plays.slots import Reals
 
 
-def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]], alike: Callable[..., bool]) -> Answer:
+def search(
+    _: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]], alike: Callable[..., bool], *__: object
+) -> Answer:
     """The search of `moving_search.c`, from the functions that give the sum of the plays at an input and its slopes,
     and tell whether the same plays follow to two inputs."""
 

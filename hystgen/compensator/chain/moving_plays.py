@@ -22,7 +22,7 @@ class Kind(NamedTuple):
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
     elements: Elements  # those in parallel with the plays
-    search: Function  # of `sum_at`, `tried_at` and `alike` below: the function that finds the input
+    search: Function  # of `sum_at`, `tried_at`, `alike` and `slope_at` below: the function that finds the input
     begin: Function  # of state and weights: sets the slope or rate with which the first search begins
     found: Function  # of moving tables, state and input: whether a search has just led there; forgets it
     turned: Function  # of tables and state: sets the same right after elements have turned
@@ -174,19 +174,29 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def follows(t: ChainTables, s: ChainState, i: int, w: Scalar) -> bool:
-        """Whether play i moves with the input at w, up to the last play."""
-        r = t.plays.threshold
-        return i < len(r) and tried(t.moving, r, i, s.plays, s.lost, s.own.moving[0], w)[0]
+        """Whether plain play i moves with the input at w; beyond the last play, none does."""
+        r, play = t.plays.threshold, s.plays.play
+        return i < len(r) and resting(r, s.plays, i, w) != play[i]
 
     @jit
     def alike(t: ChainTables, s: ChainState, w: Scalar, other: Scalar) -> bool:
-        """Whether the same plays move to either input, if they do so in the order of their thresholds."""
+        """Whether the same plain plays move to either input; they do so in the order of their thresholds."""
         first = 1
         while follows(t, s, first, w):
             first += 1
         return (first == 1 or follows(t, s, first - 1, other)) and not follows(t, s, first, other)
 
-    searched = search(sum_at, tried_at, alike)
+    @jit
+    def slope_at(t: ChainTables, s: ChainState, w: Scalar) -> Any:
+        """In fixed point, the slope of the sum of plain plays and elements at the input tried last, w."""
+        slope = t.plays.weight[0] + s.elements.slope[0]
+        i = 1
+        while follows(t, s, i, w):
+            slope = slope + t.plays.weight[i]
+            i += 1
+        return slope
+
+    searched = search(sum_at, tried_at, alike, slope_at)
 
     @jit
     def follow(t: ChainTables, s: ChainState, w: Scalar) -> Any:

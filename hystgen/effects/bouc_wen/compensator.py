@@ -19,6 +19,7 @@ from hystgen.effects.plays import (
     ElementsState,
     ElementState,
     ElementTables,
+    FixedElementTables,
     ParallelTerms,
 )
 
@@ -101,9 +102,15 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
         return ElementTables(np.array(rows, dtype=dtype), ElementNumbers.of(numbers, dtype))
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
+
+    def straight(step: float, unit: float, off: float) -> FixedElementTables:
+        most = float(np.abs(weights) @ bend)
+        found: FixedElementTables = coded[0]()(effect, step, unit, math.sqrt(2.0 * off / most) if most else math.inf)
+        return found
+
     return ParallelTerms(
         weights, most * widths, steepest, bend, LoadedElements(effect), tables, error,
-        lambda step, unit: coded[0]()(effect, step, unit), lambda: coded[1]()(effect),
+        straight, lambda: coded[1]()(effect),
     )
 
 
