@@ -8,8 +8,8 @@ having any effect, measured with a gain, the cheapest one (`any_corners`: code w
 have the difference from that, which may be negative. Plays whose input is searched for have `dilated` in common, and
 their rows have the cost beyond it; `braked` is the cost of a lag and a slew limit together beyond their sum, `quiet`
 its cost beyond a lag. `effect_sizes.csv`, from which the banner of emitted files takes its figures, has the code on the
-two cores of `hystgen.compensator.engines`; `docs/effects.csv` has all cores. With `--parts`, only some rows are measured,
-and the others stay as they are.
+cores of `hystgen.compensator.engines`; `docs/effects.csv` has all cores. With `--parts`, only these rows are measured;
+the others stay.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def main() -> None:
     write(docs / "effects.csv", heads, costs, 3, bool(given.parts))
 
 
-def write(path: Path, heads: Sequence[str], rows: Sequence[Sequence[Any]], keys: int, keep: bool) -> None:
+def write(path: Path, heads: Sequence[str], rows: Sequence[Sequence[object]], keys: int, keep: bool) -> None:
     """Write a table. `keep`: replace the rows of an existing one that have the same first `keys` entries, and add the
     others behind the last row of their arithmetic."""
     made = [[str(entry) for entry in row] for row in rows]

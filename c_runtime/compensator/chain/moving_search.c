@@ -115,7 +115,6 @@ HYSTGEN_APART bool hystgen_inverse_lands(hystgen_inverse_t *self) {
     }
     const hystgen_sum_t next = hystgen_inverse_further(&self->search);
     const hystgen_sum_t on = next - self->near;
-    const hystgen_sum_t gained = slope * (next - w);
     if (self->departs || on > HYSTGEN_STRAIGHT || on < -HYSTGEN_STRAIGHT) {
         return false;
     }
@@ -127,6 +126,7 @@ HYSTGEN_APART bool hystgen_inverse_lands(hystgen_inverse_t *self) {
         hystgen_resting(first, self->play, (hystgen_play_t)next) != self->play[first]) {
         return false;
     }
+    const hystgen_sum_t gained = slope * (next - w);
     if (hystgen_size(left - gained) < hystgen_size(left)) {
         self->search.input = (hystgen_play_t)next;
         self->search.found += gained;

@@ -187,9 +187,9 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return (first == 1 or follows(t, s, first - 1, other)) and not follows(t, s, first, other)
 
     @jit
-    def slope_at(t: ChainTables, s: ChainState, w: Scalar) -> Any:
+    def slope_at(t: ChainTables, s: ChainState, w: Scalar) -> Scalar:
         """In fixed point, the slope of the sum of plain plays and elements at the input tried last, w."""
-        slope = t.plays.weight[0] + s.elements.slope[0]
+        slope: Scalar = t.plays.weight[0] + s.elements.slope[0]
         i = 1
         while follows(t, s, i, w):
             slope = slope + t.plays.weight[i]
