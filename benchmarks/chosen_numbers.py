@@ -445,7 +445,7 @@ def tries() -> None:
             found = []
             for value in values:
                 with mock.patch.object(moving_float.at, "NEWTON_TRIES", value), jit.plain():
-                    search, s = moving_float.search(None, sum_at), reference.new_state(t, True)
+                    search, s = moving_float.search(None, sum_at, None), reference.new_state(t, True)
                     reference.operations(t, True).init(t, s)
                     s.own.moving[0] = 1
                     tried.clear()
@@ -483,7 +483,7 @@ def secants() -> None:
             found = []
             for value in values:
                 with mock.patch.object(moving_fixed, "SECANTS", value), jit.plain():
-                    search, s = moving_fixed.search(sum_at, None), reference.new_state(t, True)
+                    search, s = moving_fixed.search(sum_at, None, None, None), reference.new_state(t, True)
                     reference.operations(t, True).init(t, s)
                     s.own.moving[0] = 1
                     tried.clear()

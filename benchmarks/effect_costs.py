@@ -1,6 +1,6 @@
 """Measure what each effect adds to an emitted model: bytes of code, and instructions per sample.
 
-    python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
+    python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f] [--parts elements]
 
 Code is a module's size at -O2, the larger of zig and gcc (RISC-V: zig only); instructions are the mean over a slow sine
 in a strict -O2 build of zig, for the inverse, or for the forward operator if only it has the part. `any` is the cost of
@@ -8,7 +8,8 @@ having any effect, measured with a gain, the cheapest one (`any_corners`: code w
 have the difference from that, which may be negative. Plays whose input is searched for have `dilated` in common, and
 their rows have the cost beyond it; `braked` is the cost of a lag and a slew limit together beyond their sum, `quiet`
 its cost beyond a lag. `effect_sizes.csv`, from which the banner of emitted files takes its figures, has the code on the
-two cores of `hystgen.compensator.engines`; `docs/effects.csv` has all cores.
+cores of `hystgen.compensator.engines`; `docs/effects.csv` has all cores. With `--parts`, only these rows are measured;
+the others stay.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.verification import comparison, emulator, sources, targets
 
-MOVED = ("dashpot", "polynomial", "centre")
+MOVED = ("dashpot", "polynomial", "centre", "elements")
 INSIDE = {"quiet": "lag", "friction": "heat"}
 """Parts of the code that occur only together with another part."""
+BESIDE = dict.fromkeys(MOVED, "dilated") | INSIDE
+"""The model that has all but the part, if it is not that of a gain."""
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
@@ -61,6 +64,7 @@ EFFECTS = {
     "mode": "name: resonance, frequency: 30, damping: 0.05",
     "delay": "name: delay, time: 2.6e-3",
     "quiet": "name: lag, time_constant: 0.01",
+    "elements": "name: bouc_wen, weights: [-0.1, 0.1], widths: [2, 0.7], exponent: 1.6, balance: 1.3",
 }
 """A model with one effect for each part that `hystgen.compensator.chain.costs` counts."""
 OTHERS = {"dilated": "0", "polynomial": "[0.02]"}
@@ -124,45 +128,56 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, help="folder of both tables, default where they are shipped")
     parser.add_argument("--cores", default=",".join(engines.CORES))
+    parser.add_argument("--parts", help="rows to measure, separated by commas; default all")
     given = parser.parse_args()
     cores = given.cores.split(",")
+    parts = set(given.parts.split(",")) if given.parts else {"any_corners", *PARTS}
     sizes, costs = [], []
     with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
         for arithmetic in ARITHMETICS:
-            base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
-            least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
-            ahead = measured(Path(place) / f"forward-{arithmetic}", "gain", arithmetic, cores, "forward")
-            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
-            apart: dict[str, Measures] = {}
-            (bare, _), (with_corners, _) = (
-                measured(Path(place) / f"{effect}-corners-{arithmetic}", effect, arithmetic, cores, engine="corners")
-                for effect in ("", "gain")
-            )
-            sizes.append(("any_corners", arithmetic, *(with_corners[core] - bare[core] for core in cores)))
+
+            @functools.cache
+            def alone(effect: str, operator: str = "inverse", engine: str = "loop", of: str = arithmetic) -> Measures:
+                return measured(Path(place) / f"{effect}-{operator}-{engine}-{of}", effect, of, cores, operator, engine)
+
+            if "any_corners" in parts:
+                (bare, _), (with_corners, _) = (alone(effect, engine="corners") for effect in ("", "gain"))
+                sizes.append(("any_corners", arithmetic, *(with_corners[core] - bare[core] for core in cores)))
             for effect in ("any", *EFFECTS):
-                folder = Path(place) / f"{effect}-{arithmetic}"
+                if effect not in parts:
+                    continue
                 operator = OPERATORS.get(effect, "inverse")
-                measures = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores, operator)
-                code, counts = measures
-                before = base if effect == "any" else moved if effect in MOVED else least
-                before = ahead if operator == "forward" else before
-                before = apart[INSIDE[effect]] if effect in INSIDE else before
+                code, counts = alone("gain" if effect == "any" else effect, operator)
+                before = alone("" if effect == "any" else BESIDE.get(effect, "gain"), operator)
                 if effect == "braked":
-                    before = together([apart["lag"], apart["slew"]], least)
-                apart[effect] = measures
+                    before = together([alone("lag"), alone("slew")], alone("gain"))
                 more = [(core, code[core] - before[0][core], counts[core] - before[1][core]) for core in cores]
                 sizes.append((effect, arithmetic, *(size for _, size, _ in more)))
                 costs += [(effect, arithmetic, core, size, round(count)) for core, size, count in more]
                 print(*sizes[-1], *(round(count) for *_, count in more), flush=True)
     own, docs = (given.output or SHIPPED), (given.output or DOCS)
     if set(cores) >= set(engines.CORES):
-        with (own / "effect_sizes.csv").open("w", encoding="ascii", newline="") as file:
-            shipped = [0, 1, *(2 + cores.index(core) for core in engines.CORES)]
-            rows = [("part", "arithmetic", *cores), *sizes]
-            csv.writer(file, lineterminator="\n").writerows([row[k] for k in shipped] for row in rows)
-    with (docs / "effects.csv").open("w", encoding="ascii", newline="") as file:
-        heads = ("part", "arithmetic", "core", "bytes of code", "instructions of a sample")
-        csv.writer(file, lineterminator="\n").writerows([heads, *costs])
+        shipped = [0, 1, *(2 + cores.index(core) for core in engines.CORES)]
+        heads = ("part", "arithmetic", *engines.CORES)
+        write(own / "effect_sizes.csv", heads, [[row[k] for k in shipped] for row in sizes], 2, bool(given.parts))
+    heads = ("part", "arithmetic", "core", "bytes of code", "instructions of a sample")
+    write(docs / "effects.csv", heads, costs, 3, bool(given.parts))
+
+
+def write(path: Path, heads: Sequence[str], rows: Sequence[Sequence[object]], keys: int, keep: bool) -> None:
+    """Write a table. `keep`: replace the rows of an existing one that have the same first `keys` entries, and add the
+    others behind the last row of their arithmetic."""
+    made = [[str(entry) for entry in row] for row in rows]
+    if keep:
+        with path.open(encoding="ascii", newline="") as file:
+            table = list(csv.reader(file))[1:]
+        for row in made:
+            same = [k for k, old in enumerate(table) if old[:keys] == row[:keys]]
+            last = max(k for k, old in enumerate(table) if old[1] == row[1])
+            table[slice(same[0], same[0] + 1) if same else slice(last + 1, last + 1)] = [row]
+        made = table
+    with path.open("w", encoding="ascii", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([heads, *made])
 
 
 if __name__ == "__main__":

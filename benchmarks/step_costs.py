@@ -1,12 +1,13 @@
 """Measure the most expensive sample of emitted models: its instructions, and the bytes of stack of the deepest call.
 
-    python benchmarks/step_costs.py [-o FOLDER] [--jobs 2]
+    python benchmarks/step_costs.py [-o FOLDER] [--jobs 2] [--parts elements]
 
 Records and figures are those of `hystgen verify`: the largest over the builds of zig and gcc, on a Cortex-M0+ without
 and a Cortex-M4F with an FPU. Rows `plays` are models of plays alone, rows `effects` the same with a gain, the cheapest
 effect. Rows of memoryless parts, and of parts of the effects' code, have the instructions that the part adds to a model
 of `CODE_PLAYS` plays, and the stack of the whole model. Parts that move or bend plays are also measured for one.
-`hystgen.compensator.engines` reads `step_costs.csv` for the banner of emitted files.
+`hystgen.compensator.engines` reads `step_costs.csv` for the banner of emitted files. With `--parts`, only the rows of
+these parts of the effects' code are measured, and the others stay as they are.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import argparse
 import concurrent.futures
 import csv
+import itertools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -62,8 +64,8 @@ def beyond(found: Measured, base: Measured) -> Measured:
     }
 
 
-def measure(arithmetic: str) -> list[Row]:
-    """All rows of an arithmetic."""
+def measure(arithmetic: str, parts: frozenset[str] = frozenset()) -> list[Row]:
+    """All rows of an arithmetic, or those of some parts of the effects' code."""
     rows: list[Row] = []
 
     def add(part: str, engine: str, n: int, found: Mapping[str, tuple[int, ...]]) -> None:
@@ -72,7 +74,10 @@ def measure(arithmetic: str) -> list[Row]:
             print(*rows[-1], flush=True)
 
     bases: dict[tuple[str, str, int], Measured] = {}
-    for engine in engines.ENGINES:
+    if parts:
+        bases = {("effects", "loop", n): worst(engine_costs.model(n, "", engine_costs.GAIN), arithmetic, "loop")
+                 for n in (FEW, MANY)}  # fmt: skip
+    for engine in () if parts else engines.ENGINES:
         for part, effects in (("plays", ""), ("effects", engine_costs.GAIN)):
             for n in sorted({*PLAYS, MANY}):
                 bases[part, engine, n] = worst(engine_costs.model(n, "", effects), arithmetic, engine)
@@ -82,25 +87,27 @@ def measure(arithmetic: str) -> list[Row]:
             model = engine_costs.model(MANY, front)
             if front and engines.kind(model.cascade, arithmetic) == kind:
                 add(kind, engine, MANY, beyond(worst(model, arithmetic, engine), bases["plays", engine, MANY]))
-    for part, n, found in _effects(arithmetic, bases):
+    for part, n, found in _effects(arithmetic, bases, parts or frozenset(effect_costs.EFFECTS)):
         add(part, "loop", n, found)
     return rows
 
 
-def _effects(arithmetic: str, bases: Mapping[tuple[str, str, int], Measured]) -> Iterator[tuple[str, int, Measured]]:
+def _effects(
+    arithmetic: str, bases: Mapping[tuple[str, str, int], Measured], parts: frozenset[str]
+) -> Iterator[tuple[str, int, Measured]]:
+    needed = parts | {effect_costs.BESIDE[part] for part in parts if part in effect_costs.BESIDE}
+    needed |= {"lag", "slew"} if "braked" in parts else set()
     for n in (MANY, FEW):
         apart: dict[str, Measured] = {}
         for part in effect_costs.EFFECTS:
-            if part == "gain" or (n == FEW and part not in PER_PLAY):
+            if part == "gain" or part not in needed or (n == FEW and part not in PER_PLAY):
                 continue
             operator = OPERATORS.get(part, "both")
             apart[part] = worst(effect_costs.model(part, n), arithmetic, "loop", operator)
-        for part, found in apart.items():
-            base = bases["effects", "loop", n]
-            if part in effect_costs.MOVED:
-                base = apart["dilated"]
-            elif part in effect_costs.INSIDE:
-                base = apart[effect_costs.INSIDE[part]]
+        for part in [each for each in apart if each in parts]:
+            found = apart[part]
+            beside = effect_costs.BESIDE.get(part)
+            base = apart[beside] if beside else bases["effects", "loop", n]
             more = beyond(found, base)
             if part == "braked":
                 for one in ("lag", "slew"):
@@ -113,10 +120,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, default=engine_costs.SHIPPED, help="folder, default the shipped")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--parts", help="parts of the effects' code, separated by commas; default all rows")
     given = parser.parse_args()
+    parts = frozenset(given.parts.split(",")) if given.parts else frozenset()
     with concurrent.futures.ProcessPoolExecutor(given.jobs) as pool:
-        rows = [row for of in pool.map(measure, ARITHMETICS) for row in of]
-    with (given.output / "step_costs.csv").open("w", newline="", encoding="ascii") as file:
+        rows = [row for of in pool.map(measure, ARITHMETICS, itertools.repeat(parts)) for row in of]
+    path = given.output / "step_costs.csv"
+    if parts:
+        with path.open(newline="", encoding="ascii") as file:
+            kept = [row for row in list(csv.reader(file))[1:] if row[0] not in parts]
+        rows += [(*row[:4], int(row[4]), *row[5:]) for row in kept]
+    with path.open("w", newline="", encoding="ascii") as file:
         writer = csv.writer(file, lineterminator="\n")
         stacks = (f"{core} stack" for core in engines.CORES)
         writer.writerow(("part", "arithmetic", "engine", "operator", "n", *engines.CORES, *stacks))

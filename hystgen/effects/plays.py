@@ -102,6 +102,7 @@ class MovingNumbers(Struct):
     one: Literal
     rate: Real = note("reciprocal of the sum's mean slope")
     close: Real = note("distance of the sum at which a search ends")
+    smooth: Real = note("the same if no play starts or stops to follow on the way")
     standing_share: Real = note("share of a step after which the input is taken as standing still")
 
 
@@ -141,14 +142,17 @@ class FixedPiece(Struct):
 
 
 class FixedElement(Struct):
-    """An element: factors from a move of the input, of at most `far`, to a distance on the curve, and from there to the
-    sum, with left shifts of the argument of the first and of the product of the second."""
+    """An element: factors from a move of the input, at most `far`, to a distance on the curve, from there to the sum,
+    and from a slope of the curve to that of the sum, with left shifts of the argument of the first and of the products
+    of the others."""
 
     distance: AnyFactor
     amplitude: AnyFactor
+    weight: AnyFactor
     far: Int64
     distance_lift: UInt8
     amplitude_lift: UInt8
+    weight_lift: UInt8
 
 
 class ElementNumbers(Struct):
@@ -163,10 +167,20 @@ E = TypeVar("E", ElementState, FixedElementState)
 
 
 class ElementsState(NamedTuple, Generic[E]):
-    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); each element."""
+    """Memory of elements (k,): the input at their last turn and whether it has risen since (1,); each element.
+
+    In floating point, `found` and `asked` are the input to which a search has led and the sum of the plays there. In
+    fixed point, they are the input for which the sum of the elements was last computed and that sum, with its `slope`;
+    `departs`: whether the elements have turned there; `steep`: the slope of the whole sum that the rate of a search
+    has, or -1 after a turn."""
 
     turned: Reals
     upward: Counts
+    found: Reals
+    asked: Reals
+    slope: Reals
+    steep: Reals
+    departs: Counts
     element: E
 
 
@@ -186,23 +200,31 @@ class ElementTables(NamedTuple):
     def memory(self) -> ElementsState[ElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
         dtype = self.piece.dtype
-        return ElementsState(np.zeros(1, dtype), np.ones(1, np.int64), ElementState.zeros(len(self.element), dtype))
+        turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
+        one = np.ones(1, np.int64)
+        elements = ElementState.zeros(len(self.element), dtype)
+        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
 
 
 class FixedElementTables(NamedTuple):
-    """The same in fixed point: pieces (K + 1,) of the curve, and elements (k,)."""
+    """The same in fixed point: pieces (K + 1,) of the curve, and elements (k,); `straight`: distance from an input, in
+    steps, within which the sum is computed along its slope there."""
 
     piece: FixedPiece
     element: FixedElement
+    straight: int
 
     @classmethod
     def none(cls) -> FixedElementTables:
         """The tables of a model without elements."""
-        return cls(FixedPiece.zeros(1), FixedElement.zeros(0))
+        return cls(FixedPiece.zeros(1), FixedElement.zeros(0), 0)
 
     def memory(self) -> ElementsState[FixedElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        return ElementsState(np.zeros(1, np.int64), np.ones(1, np.int64), FixedElementState.zeros(len(self.element)))
+        turned, found, asked, slope, steep = np.zeros((5, 1), np.int64)
+        one = np.ones(1, np.int64)
+        elements = FixedElementState.zeros(len(self.element))
+        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
 
 
 class MovingTables(NamedTuple):
@@ -366,17 +388,19 @@ class PlaysPart(Generic[T, F]):
 
 class ParallelTerms(NamedTuple):
     """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
-    input; `memory`: the elements in double precision; `tables`: their constants in a data type; `error`: bound on the
-    error of their sum in a data type, in the C (True) or of the law in double precision; `coded`: their constants in
-    fixed point for steps of the input and of the sum; `coded_error`: bound on the error of their sum there."""
+    input (`steepest`), and of that per change of the input (`bend`); `memory`: the elements in double precision;
+    `tables`: their constants in a data type; `error`: bound on the error of their sum in a data type, in the C (True)
+    or of the law in double precision; `coded`: their constants in fixed point for steps of the input and of the sum,
+    and the error of the sum allowed where it is computed along its slope; `coded_error`: bound on its other errors."""
 
     weights: Array
     most: Array
     steepest: Array
+    bend: Array
     memory: ElementsInDouble
     tables: Callable[[Any], ElementTables]
     error: Callable[[Any, bool], float]
-    coded: Callable[[float, float], FixedElementTables]
+    coded: Callable[[float, float, float], FixedElementTables]
     coded_error: Callable[[], float]
 
 

@@ -232,6 +232,18 @@ def instance(op: str, t: Variant, blocks: Sequence[NamedBlock], form: Form, play
         *[
             Field("play_t", "turned", "input of the elements in parallel with the plays at their last turn"),
             Field("bool", "upward", "their input has risen since"),
+            *[
+                Field("play_t", "found", "input to which a search has led,"),
+                Field("signal_t", "asked", "and the sum of the plays there"),
+            ] * (inverse and t.family.kind == "float"),
+            *[
+                Field("play_t", "near", "input for which the sum of the elements was last computed,"),
+                Field("sum_t", "joined", "that sum,"),
+                Field("sum_t", "slope", "its slope, and whether"),
+                Field("bool", "departs", "they have turned there"),
+            ] * (t.family.kind == "fixed"),
+            *[Field("sum_t", "steep", "slope that the rate of a search has, or -1 after a turn")]
+            * (inverse and t.family.kind == "fixed" and t.smooth),
             Field("element_t", "element", "", str(t.elements)),
         ] * bool(t.elements),
         *[Field("search_t", "search", "for the input of the plays")] * (inverse and bool(t.bends)),

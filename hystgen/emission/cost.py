@@ -310,13 +310,33 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     if isinstance(m, plays.MovingTables):  # a try also computes the slope
         sought = {plays.DILATED: (2, 4), plays.RELAXING: (1, 3), plays.DASHPOT: (6, yields)}.get(m.moves, (0, 2))
         tried = 3 + sought[0] + bent, sought[1]
+    joined, turned = _elements(m)
+    at, turns = tries + 1, 1 + inverse  # a drive other than that found may turn the elements once more
     return (
-        tries + 1 + beside[0],
+        tries + 1 + beside[0] + at * joined[0] + turns * turned[0],
         tries * tried[0] + moved[0] + kept[0] + twice * (1 + bent),
-        beside[1] + 15 + 6 * inverse,
+        beside[1] + 15 + 6 * inverse + at * joined[1] + turns * turned[1],
         tries * tried[1] + 2 + moved[1] + kept[1] + twice * looked,
         tanh * (tries + twice),
     )
+
+
+def _elements(m: MovingTables | FixedMovingTables) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Multiplications and comparisons of the sum of elements in parallel with the plays, and of their turn."""
+    from hystgen.effects import plays
+
+    count, looked = len(m.elements.element), len(m.elements.piece).bit_length()
+    if isinstance(m, plays.FixedMovingTables):
+        degree = m.elements.piece.up.shape[1]
+        at = 2 * degree + 8, looked + 8  # five products have two parts, and each piece's slope comes with its mean
+        put = degree * (degree + 5) // 2 + 5, looked + 8
+    else:
+        degree = (m.elements.piece.shape[1] - 2) // 2
+        at = 2 * degree + 2, looked + 2
+        put = degree * (degree + 3) // 2, looked + 2
+    if not count:
+        return (0, 0), (0, 0)
+    return (count * at[0] + 1, count * at[1] + 6), (count * (at[0] + put[0]), count * (at[1] + put[1]))
 
 
 QUOTIENT = (8, 17)

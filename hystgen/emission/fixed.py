@@ -171,6 +171,7 @@ class FixedForm(Form):
             numbers += [
                 ("ELEMENTS", f"{count}u", "in parallel with the plays"),
                 ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
+                ("STRAIGHT", operand(plays.elements.straight), "steps of the input over which their sum is straight"),
             ]
         return arrays, numbers
 

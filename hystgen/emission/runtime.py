@@ -287,6 +287,7 @@ class Variant:
             "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre", "ELEMENTS": self.elements,
             "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
+            "SMOOTH_SUM": self.smooth,
         }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 
@@ -294,6 +295,11 @@ class Variant:
     def bent(self) -> bool:
         """Whether plays are bent."""
         return self.bends not in ("", "none")
+
+    @property
+    def smooth(self) -> bool:
+        """Whether plays that are not bent are summed up with elements in parallel."""
+        return self.elements > 0 and self.moves == "play" and not self.bent
 
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""

@@ -21,13 +21,14 @@ typedef __float128 place;
 typedef long double place; /* 113 bits there */
 #endif
 
-enum { MOST_PLAYS = 32, MOST_CREEPS = 16, MOST_LINE = 64, TURNS = 40 };
+enum { MOST_PLAYS = 32, MOST_CREEPS = 16, MOST_ELEMENTS = 3, MOST_LINE = 64, TURNS = 40, TRIES = 200 };
 enum { OUTPUT_CLAMPED = 2, HELD = 4, SLEW_LIMITED = 16 };
 
 /* Everything that an actuator remembers. */
 typedef struct {
     bool moving;
     real w, play[MOST_PLAYS + 1], h; /* input of the plays, their states and sum */
+    real element[MOST_ELEMENTS];     /* z/width */
     real creep[MOST_CREEPS];
     real travelled, applied; /* the drive as commanded */
     place at;                /* where the amplifier is */
@@ -88,7 +89,39 @@ static real play_after(const plant_t *p, const memory_t *s, int i, real w) {
     return inside(s->play[i], w - r, w + r);
 }
 
-/* The sum of the plays with their input at w, and its slope there in the direction of the move. */
+/* z/width of an element that has moved on by x >= 0 widths, from s below 0, in closed form: `ds/dx = 1 + k |s|^n`, with
+   k = 2 b - 1. Sets what is left of x behind s = 0. */
+static real rising(const plant_t *p, real s, real *x) {
+    const real k = 2 * (real)p->m->balance - 1, root = sqrtl(k);
+    const bool squared = p->m->exponent == 2;
+    const real far = k > 0 ? squared ? -atanl(root * s) / root : log1pl(-k * s) / k : -s;
+    if (*x >= far) {
+        *x -= far;
+        return 0;
+    }
+    const real to = k > 0 ? squared ? tanl(atanl(root * s) + root * *x) / root : s * expl(-k * *x) - expm1l(-k * *x) / k
+                          : s + *x;
+    *x = 0;
+    return to;
+}
+
+/* z/width of element j after its input has moved to w: above 0, `ds/dx = 1 - s^n`. Sets its slope in widths. */
+static real element_after(const plant_t *p, const memory_t *s, int j, real w, real *slope) {
+    const real way = (w - s->w) / (real)p->m->width[j], side = way < 0 ? -1 : 1;
+    const bool squared = p->m->exponent == 2;
+    real x = side * way, to = side * s->element[j];
+    if (to < 0) {
+        to = rising(p, to, &x);
+    }
+    if (x > 0) {
+        to = squared ? (to + tanhl(x)) / (1 + to * tanhl(x)) : to * expl(-x) - expm1l(-x);
+    }
+    *slope = 1 - (to < 0 ? 1 - 2 * (real)p->m->balance : 1) * (squared ? to * to : fabsl(to));
+    return side * to;
+}
+
+/* The sum of plays and elements with their input at w, and its slope there in the direction of the move. Elements at
+   rest contribute nothing. */
 static real plays_at(const plant_t *p, const memory_t *s, real w, real *slope) {
     real sum = (real)p->m->weight[0] * w;
     int i;
@@ -100,15 +133,31 @@ static real plays_at(const plant_t *p, const memory_t *s, real w, real *slope) {
             *slope += (real)p->m->weight[i];
         }
     }
+    for (i = 0; i < p->m->elements && s->moving; ++i) {
+        real steep;
+        sum += (real)p->m->part[i] * (real)p->m->width[i] * element_after(p, s, i, w, &steep);
+        *slope += (real)p->m->part[i] * steep;
+    }
     return sum;
 }
 
-/* The input at which the plays sum to h: on one way the sum is convex, or concave downwards. */
+/* The input at which the sum is h, which increases with the input. */
 static real plays_solved(const plant_t *p, const memory_t *s, real h) {
-    real slope, w = s->w;
+    const real far = 4 * ((real)p->m->high - (real)p->m->low);
+    real slope, w = s->w, low = w - far, high = w + far;
     int i;
-    for (i = 0; i < TURNS; ++i) {
-        const real next = w + (h - plays_at(p, s, w, &slope)) / slope;
+    for (i = 0; i < TRIES; ++i) {
+        const real left = h - plays_at(p, s, w, &slope);
+        real next = w + left / slope;
+        if (left > 0) {
+            low = w;
+        } else {
+            high = w;
+        }
+        if (next == w) {
+            break;
+        }
+        next = next > low && next < high ? next : low + (high - low) / 2;
         if (next == w) {
             break;
         }
@@ -188,6 +237,9 @@ static real absorb(const plant_t *p, memory_t *s, real v, real x) {
     for (i = 1; i <= p->m->n; ++i) {
         s->play[i] = play_after(p, s, i, a);
     }
+    for (i = 0; i < p->m->elements; ++i) {
+        s->element[i] = s->moving ? element_after(p, s, i, a, &slope) : 0;
+    }
     s->w = a;
     s->h = h;
     s->applied = v;
@@ -249,6 +301,18 @@ static double argument(const effects_probe_t *q, double x, double lsb) {
     return q->kind == EFFECTS_FIXED ? nearbyint(x / lsb) : q->kind == EFFECTS_F32 ? (double)(float)x : x;
 }
 
+/* What the table of an ageing gain adds to the error of an inverse whose header states a measured error alone, as with
+   elements: a record meets its largest error only after long travel, while the forward operator states a bound. */
+static double aged_error(const effects_model_t *m, const effects_probe_t *q) {
+    const double lsb = q->kind == EFFECTS_FIXED ? q->output_lsb : 1;
+    double least = m->weight[0];
+    int i;
+    for (i = 0; i < m->elements; ++i) {
+        least += fmin(m->part[i], 0) * 2 * m->balance;
+    }
+    return m->ages && m->elements ? q->forward_bound * lsb / least : 0;
+}
+
 void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const effects_call_t *call, long n,
                      double shrink, effects_result_t *out) {
     plant_t p;
@@ -259,7 +323,7 @@ void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const e
     const double bit = q->kind == EFFECTS_FIXED ? lsb : (double)far * (q->kind == EFFECTS_F32 ? 0x1p-23 : 0x1p-52);
     const int ahead = (int)ceil(m->delay / m->seconds);
     const real part = ahead ? (real)m->delay / (real)m->seconds - (ahead - 1) : 0;
-    const double bound = q->inverse_bound * lsb * shrink, rounding = q->rounding_bound * lsb * shrink;
+    const double bound = q->inverse_bound * lsb * shrink, rounding = (q->rounding_bound * lsb + aged_error(m, q)) * shrink;
     bool has_pending = false, filled = false, committed = false;
     long references = 0, k;
     void *self = calloc(1, q->inverse_size);

@@ -46,6 +46,9 @@ typedef struct {
     double drift; /* output units per s */
     double delay; /* s */
     double lag;   /* s */
+    int elements; /* Bouc-Wen elements in parallel with the plays */
+    const double *part, *width;
+    double exponent, balance; /* an exponent of 1 or 2 */
 } effects_model_t;
 
 enum { EFFECTS_STEP, EFFECTS_HELD, EFFECTS_COMMIT, EFFECTS_SETTLE, EFFECTS_TEMPERATURE, EFFECTS_PUSH };

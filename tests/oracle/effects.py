@@ -42,6 +42,9 @@ class _Model(ctypes.Structure):
         *((name, ctypes.c_double) for name in ("loss", "travel", "gain_per_degree", "offset_per_degree", "reference")),
         ("saturates", ctypes.c_int),
         *((name, ctypes.c_double) for name in ("level", "centre", "drift", "delay", "lag")),
+        ("elements", ctypes.c_int), ("part", ctypes.POINTER(ctypes.c_double)),
+        ("width", ctypes.POINTER(ctypes.c_double)),
+        *((name, ctypes.c_double) for name in ("exponent", "balance")),
     )  # fmt: skip
 
 
@@ -129,6 +132,7 @@ def model_of(case: Case) -> _Model:
     low, high = case.data["input_range"]
     slew, creep, ageing = effects.get("slew_limit", {}), effects.get("creep", {}), effects.get("ageing", {})
     thermal, saturation = effects.get("thermal", {}), effects.get("saturation", {})
+    elements = effects.get("bouc_wen", {})
     return _Model(
         len(pi["thresholds"]) - 1, doubles(pi["thresholds"]), doubles(pi["weights"]),
         pi.get("initial_state", 0.0), low, high,
@@ -141,11 +145,14 @@ def model_of(case: Case) -> _Model:
         SATURATES[saturation.get("shape", "tanh")] if saturation else 0, saturation.get("level", 1.0),
         saturation.get("centre", 0.0), effects.get("drift", {}).get("rate", 0.0),
         effects.get("delay", {}).get("time", 0.0), effects.get("lag", {}).get("time_constant", 0.0),
+        len(elements.get("weights", ())), doubles(elements.get("weights", ())), doubles(elements.get("widths", ())),
+        elements.get("exponent", 1.0), elements.get("balance", 1.0),
     )  # fmt: skip
 
 
 def drawn(seed: int, arithmetic: str) -> Case:
-    """A model of plays and random effects: most occur in half of the models, a limited rate in three of four."""
+    """A model of plays and random effects: most occur in half of the models, a limited rate in three of four, elements
+    in two of five."""
     rng = np.random.default_rng([seed, 53])
     seconds = float(10.0 ** rng.uniform(-5.0, -2.0))
     low, span = float(rng.choice([0.0, -50.0, -3.0])), float(10.0 ** rng.uniform(0.0, 2.0))
@@ -188,6 +195,13 @@ def drawn(seed: int, arithmetic: str) -> Case:
     if rng.random() < 0.5:
         data["model"]["output_offset"] = float(size * rng.uniform(-0.3, 0.3))
     data["emit"] = {"compensation": {"compensate": ["drift"]}}
+    if rng.random() < 0.4:
+        k, balance = int(rng.integers(1, 4)), float(rng.uniform(0.5, 2.0))
+        room = weights[0] / (k * 2.0 * balance)  # right after a turn, an element's slope is up to 2 b times its weight
+        parts = [float(x) for x in room * rng.uniform(-0.8, 1.6, k)]
+        widths = [float(x) for x in span * 10.0 ** rng.uniform(-1.3, 0.0, k)]
+        keys = {"weights": parts, "widths": widths, "exponent": float(rng.choice([1.0, 2.0])), "balance": balance}
+        effects.append({"name": "bouc_wen", **keys})
     return Case(f"m{seed}", data, arithmetic)
 
 
@@ -339,8 +353,11 @@ def _reachable(case: Case) -> tuple[float, float]:
         y = rest * sum(p * (w if r == 0.0 else min(max(low, w - r), w + r)) for r, p in pairs)
         return offset + (level * float(np.tanh(y / level)) if level else y)
 
-    bottom, top = output(low), output(high)
-    return bottom + 0.05 * (top - bottom), top - 0.05 * (top - bottom)
+    elements = effects.get("bouc_wen", {})
+    parts = zip(elements.get("weights", ()), elements.get("widths", ()), strict=True)
+    beside = rest * sum(abs(weight) * width for weight, width in parts)
+    bottom, top = output(low) + beside, output(high) - beside
+    return (bottom + 0.05 * (top - bottom), top - 0.05 * (top - bottom)) if bottom < top else (top, bottom)
 
 
 def follow(cases: list[Case], folder: Path, seed: int, samples: int, shrink: float = 1.0) -> Iterator[

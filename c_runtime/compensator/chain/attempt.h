@@ -15,6 +15,7 @@ typedef struct {
     hystgen_real_t steady;  /* and that in steady motion, in which plays follow in full; */
     hystgen_real_t reached; /* value that one of them reaches there, */
     hystgen_real_t share;   /* and its share of a further change in the input */
+    unsigned int first;     /* the first of those that stay */
 } hystgen_attempt_t;
 
 #endif

@@ -49,6 +49,7 @@
 #define HYSTGEN_BUMP_END 2000000000
 #define HYSTGEN_YIELD_BITS 8u
 #define HYSTGEN_STRETCH 2147483648u
+#define HYSTGEN_STRAIGHT 1000
 extern const hystgen_factor_t hystgen_relaxing_late;
 extern const hystgen_factor_t hystgen_relaxing_kept;
 extern const hystgen_tables_t hystgen_relaxing_tables;
@@ -143,6 +144,13 @@ typedef struct {
     unsigned int released;
     hystgen_play_t turned;
     bool upward;
+    hystgen_play_t found;
+    hystgen_signal_t asked;
+    hystgen_play_t near;
+    hystgen_sum_t joined;
+    hystgen_sum_t slope;
+    hystgen_sum_t steep;
+    bool departs;
     hystgen_element_t element[HYSTGEN_ELEMENTS];
     hystgen_search_t search;
 #else

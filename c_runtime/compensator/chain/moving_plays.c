@@ -15,7 +15,29 @@ static inline hystgen_sum_t hystgen_operator_way(const hystgen_operator_t *self,
     return self->upward ? rise : -rise;
 }
 
-/* The elements turn at the present input of the plays. */
+#ifdef HYSTGEN_FIXED
+/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
+   at rest: along the slope at a place near w (`hystgen_operator_approach`). */
+static inline hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
+                                                    hystgen_play_t w) {
+    return self->moving ? self->joined + self->slope * ((hystgen_sum_t)w - self->near) : 0;
+}
+
+/* The elements depart from the input w, where this is their sum, in a new direction. */
+static void hystgen_operator_depart(hystgen_operator_t *self, hystgen_play_t w, hystgen_sum_t sum) {
+    unsigned int j;
+    self->near = w;
+    self->joined = sum;
+    self->slope = 0;
+    self->departs = true;
+    HYSTGEN_ROLLED
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        self->slope += hystgen_element_turned(j, &self->element[j]);
+    }
+}
+#endif
+
+/* The elements turn at the present input of the plays. Their sum goes on from there. */
 HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
     const hystgen_sum_t way = hystgen_operator_way(self, self->play[0]);
     unsigned int j;
@@ -23,30 +45,39 @@ HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
         hystgen_element_turn(&self->element[j], hystgen_element_distance(j, way));
     }
+#ifdef HYSTGEN_FIXED
+    hystgen_operator_depart(self, self->play[0], hystgen_operator_joined(self, self->play[0]));
+#endif
     self->turned = self->play[0];
     self->upward = !self->upward;
 }
 
 #ifdef HYSTGEN_FIXED
-/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
-   at rest. */
-HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
-                                                    hystgen_play_t w) {
+/* Computes the sum of the elements at w, and its slope, unless it has been computed near w since
+   they departed. */
+HYSTGEN_APART void hystgen_operator_approach(hystgen_operator_t *self, hystgen_play_t w) {
+    const hystgen_sum_t on = (hystgen_sum_t)w - self->near;
     const hystgen_sum_t way = hystgen_operator_way(self, w);
     hystgen_sum_t sum = 0;
     unsigned int j;
-    if (!self->moving) {
-        return 0;
+    if (!self->moving || on == 0 ||
+        (!self->departs && on <= HYSTGEN_STRAIGHT && on >= -HYSTGEN_STRAIGHT)) {
+        return;
     }
+    self->near = w;
+    self->departs = false;
+    self->slope = 0;
     HYSTGEN_ROLLED
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
-        sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way));
+        sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way),
+                                    &self->slope);
     }
-    return self->upward ? sum : -sum;
+    self->joined = self->upward ? sum : -sum;
 }
+
 #else
-/* Sum of the elements after their input has moved on to w, in the direction in which they move, or
-   at rest. Sets its slope. */
+/* Sum of the elements after their input has moved on to w, in the direction in which they move,
+   or at rest. Sets its slope. */
 HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
                                                     hystgen_play_t w, hystgen_sum_t *slope) {
     const hystgen_sum_t way = hystgen_operator_way(self, w);
@@ -85,6 +116,9 @@ static bool hystgen_operator_elements(hystgen_operator_t *self, hystgen_play_t w
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
         hystgen_element_unload(&self->element[j]);
     }
+#ifdef HYSTGEN_FIXED
+    hystgen_operator_depart(self, w, 0);
+#endif
     return false;
 }
 #endif
@@ -186,15 +220,22 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
 #else
     if (!self->moving || w != self->search.input) {
 #endif
+#ifdef HYSTGEN_HAS_ELEMENTS
+        hystgen_operator_approach(self, w);
+#endif
         hystgen_operator_release(self, w);
         self->search.input = w;
         self->search.found = hystgen_operator_sum(self, w);
     }
     self->search.rate = self->moving ? self->search.rate : HYSTGEN_FASTEST;
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+    self->steep = self->moving ? self->steep : 0;
+#endif
     hystgen_operator_move(self, w, self->search.found);
 #else
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_operator_elements(self, w);
+    hystgen_operator_approach(self, w);
 #endif
     hystgen_operator_release(self, w);
     hystgen_operator_move(self, w, hystgen_operator_sum(self, w));
@@ -234,6 +275,7 @@ HYSTGEN_APART void hystgen_operator_move(hystgen_operator_t *self, hystgen_play_
     unsigned int i;
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_operator_elements(self, w);
+    hystgen_operator_approach(self, w);
     sum += hystgen_operator_joined(self, w);
 #endif
     HYSTGEN_ROLLED
@@ -285,26 +327,42 @@ HYSTGEN_APART hystgen_sum_t hystgen_with_staying(unsigned int i, const hystgen_p
     return sum;
 }
 
-/* The plays move while their input moves to w. Returns their sum. */
-HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
-                                                 hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+/* The plays move while their input moves to w. */
+static void hystgen_moved_on(hystgen_play_t *play, hystgen_sum_t *bent, hystgen_play_t w) {
     unsigned int i;
     HYSTGEN_ROLLED
 #ifdef HYSTGEN_HAS_ORDERED_PLAYS
     for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_move(i, play, play[0], w); ++i) {
         (void)hystgen_bent_anew(i, play[i], bent);
     }
+#else
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        if (hystgen_move(i, play, play[0], w)) {
+            (void)hystgen_bent_anew(i, play[i], bent);
+        }
+    }
+#endif
+    play[0] = w;
+}
+
+/* The same. Returns their sum. */
+HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
+                                                 hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+#ifdef HYSTGEN_HAS_ORDERED_PLAYS
+    hystgen_moved_on(play, bent, w);
     sum = hystgen_with_staying(1, play, bent, sum);
 #else
+    unsigned int i;
+    HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (hystgen_move(i, play, play[0], w)) {
             (void)hystgen_bent_anew(i, play[i], bent);
         }
         sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);
     }
-#endif
     play[0] = w;
+#endif
     return sum;
 }
 
@@ -331,23 +389,49 @@ static inline hystgen_sum_t *hystgen_operator_bent(hystgen_operator_t *self) {
 #endif
 }
 
+#ifdef HYSTGEN_HAS_ELEMENTS
+/* Plays and elements move while their input moves to w. Updates their sum, unless a search has just
+   led there. */
+static void hystgen_operator_join(hystgen_operator_t *self, hystgen_sum_t *bent, hystgen_play_t w) {
+    hystgen_sum_t slope;
+#ifdef HYSTGEN_INVERSE
+    const bool turned = hystgen_operator_elements(self, w);
+    const bool known = !(turned || w < self->found || w > self->found);
+    self->found = HYSTGEN_LARGEST_INPUT;
+    hystgen_moved_on(self->play, bent, w);
+    if (known) {
+        self->level = self->asked;
+        return;
+    }
+#else
+    (void)hystgen_operator_elements(self, w);
+    hystgen_moved_on(self->play, bent, w);
+#endif
+    self->level = hystgen_with_staying(1, self->play, bent, hystgen_model_tables.weight[0] * w);
+    self->level = self->level + hystgen_operator_joined(self, w, &slope);
+}
+#endif
+
 /* The plays follow their input w, or come to rest there, and a search begins anew. Updates their
    sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_sum_t *bent = hystgen_operator_bent(self);
-#ifdef HYSTGEN_HAS_ELEMENTS
-    hystgen_sum_t slope;
-    (void)hystgen_operator_elements(self, w);
-#endif
     if (self->moving) {
-        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
 #ifdef HYSTGEN_HAS_ELEMENTS
-        self->level = self->level + hystgen_operator_joined(self, w, &slope);
+        hystgen_operator_join(self, bent, w);
+#else
+        self->level = hystgen_level(hystgen_moved_follow(self->play, bent, w));
 #endif
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS
         hystgen_relax(self->play, bent);
 #endif
     } else {
+#ifdef HYSTGEN_HAS_ELEMENTS
+        (void)hystgen_operator_elements(self, w);
+#ifdef HYSTGEN_INVERSE
+        self->found = HYSTGEN_LARGEST_INPUT;
+#endif
+#endif
 #ifdef HYSTGEN_INVERSE
         self->search.slope = hystgen_model_tables.weight[0];
 #endif

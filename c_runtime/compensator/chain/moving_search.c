@@ -13,9 +13,24 @@ static bool hystgen_inverse_turns(hystgen_inverse_t *self, hystgen_signal_t h) {
     const bool turns = self->moving && (self->upward ? h < self->level : h > self->level);
     if (turns) {
         hystgen_inverse_turn_elements(self);
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_SMOOTH_SUM)
+        self->steep = -1;
+#endif
     }
     return turns;
 }
+
+#ifndef HYSTGEN_FIXED
+/* Slope of the sum right after a turn, when no play follows. */
+static hystgen_real_t hystgen_inverse_turned_slope(const hystgen_inverse_t *self) {
+    hystgen_real_t slope = hystgen_model_tables.weight[0];
+    unsigned int j;
+    for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
+        slope = slope + hystgen_element_weight[j] * self->element[j].c[0];
+    }
+    return slope;
+}
+#endif
 #endif
 
 #ifdef HYSTGEN_FIXED
@@ -41,17 +56,24 @@ HYSTGEN_APART bool hystgen_inverse_over(hystgen_search_t *search) {
     return hystgen_size(found - search->total) <= HYSTGEN_NEAR || search->top == search->low;
 }
 
+/* Updates the rate to that of an input which has gone `way` while the sum has gained this. */
+HYSTGEN_APART void hystgen_inverse_rate(hystgen_search_t *search, hystgen_sum_t way,
+                                        hystgen_sum_t gained) {
+    const hystgen_sum_t some = gained > 1 ? gained : 1;
+    const hystgen_sum_t rate = hystgen_quotient(way, some, HYSTGEN_RATE_BITS);
+    const hystgen_sum_t inside = rate > HYSTGEN_FASTEST ? HYSTGEN_FASTEST : rate;
+    search->rate = (uint32_t)(inside > 1 ? inside : 1);
+}
+
+#ifndef HYSTGEN_HAS_SMOOTH_SUM
 /* Updates the rate to that of the secant through the last two inputs, once there are two. */
-HYSTGEN_APART void hystgen_inverse_turn(hystgen_search_t *search) {
+static void hystgen_inverse_turn(hystgen_search_t *search) {
     const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->before);
     if (way > 0) {
-        const hystgen_sum_t gained = hystgen_size(search->found - search->last);
-        const hystgen_sum_t some = gained > 1 ? gained : 1;
-        const hystgen_sum_t rate = hystgen_quotient(way, some, HYSTGEN_RATE_BITS);
-        const hystgen_sum_t inside = rate > HYSTGEN_FASTEST ? HYSTGEN_FASTEST : rate;
-        search->rate = (uint32_t)(inside > 1 ? inside : 1);
+        hystgen_inverse_rate(search, way, hystgen_size(search->found - search->last));
     }
 }
+#endif
 
 /* The input to which the rate leads from the one tried last: at least 1 further, and in range. */
 HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *search) {
@@ -68,13 +90,60 @@ HYSTGEN_APART hystgen_sum_t hystgen_inverse_further(const hystgen_search_t *sear
     return left > 0 ? input + inside : input - inside;
 }
 
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+/* Updates the rate to that of the slope at the input tried last, unless this is the first in the
+   same direction. Returns whether one step along that slope leads to the solution: the elements are
+   straight on the way, and no play starts or stops to move. Goes there. */
+HYSTGEN_APART bool hystgen_inverse_lands(hystgen_inverse_t *self) {
+    const hystgen_play_t w = self->search.input;
+    const hystgen_sum_t left = self->search.total - self->search.found;
+    hystgen_sum_t slope = hystgen_model_tables.weight[0] + self->slope;
+    unsigned int first;
+    if (self->search.tries >= HYSTGEN_SECANTS || (self->search.tries == 0 && self->steep >= 0)) {
+        return false;
+    }
+    HYSTGEN_ROLLED
+    for (first = 1; first <= self->released; ++first) {
+        if (hystgen_resting(first, self->play, w) == self->play[first]) {
+            break;
+        }
+        slope += hystgen_model_tables.weight[first];
+    }
+    if (slope != self->steep) {
+        self->steep = slope;
+        hystgen_inverse_rate(&self->search, 1, slope);
+    }
+    const hystgen_sum_t next = hystgen_inverse_further(&self->search);
+    const hystgen_sum_t on = next - self->near;
+    if (self->departs || on > HYSTGEN_STRAIGHT || on < -HYSTGEN_STRAIGHT) {
+        return false;
+    }
+    if (first > 1u &&
+        hystgen_resting(first - 1u, self->play, (hystgen_play_t)next) == self->play[first - 1u]) {
+        return false;
+    }
+    if (first <= HYSTGEN_N_PLAYS &&
+        hystgen_resting(first, self->play, (hystgen_play_t)next) != self->play[first]) {
+        return false;
+    }
+    const hystgen_sum_t gained = slope * (next - w);
+    if (hystgen_size(left - gained) < hystgen_size(left)) {
+        self->search.input = (hystgen_play_t)next;
+        self->search.found += gained;
+    }
+    return true;
+}
+#endif
+
 /* Goes on to the next input: by the rate of a secant, if that leads inside the interval and has not
    been tried too often; else to the middle of the interval. */
 HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
     hystgen_sum_t next = search->input; /* an end of the interval */
     if (search->tries < HYSTGEN_SECANTS) {
         ++search->tries;
+#ifndef HYSTGEN_HAS_SMOOTH_SUM
         hystgen_inverse_turn(search);
+#endif
         next = hystgen_inverse_further(search);
     }
     if (next <= search->low || next > search->top) {
@@ -99,17 +168,28 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
 #ifndef HYSTGEN_HAS_PLAIN_PLAYS
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_inverse_turns(self, h);
+    hystgen_inverse_approach(self, self->search.input);
 #endif
     self->search.found = hystgen_inverse_sum(self, self->search.input);
 #elif defined(HYSTGEN_HAS_ELEMENTS)
-    if (hystgen_inverse_turns(self, h)) {
+    const bool turned = hystgen_inverse_turns(self, h);
+    hystgen_inverse_approach(self, self->search.input);
+    if (turned) {
         self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
 #endif /* plain plays have just followed an input, at which their sum is known */
     while (!hystgen_inverse_over(&self->search)) {
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+        if (hystgen_inverse_lands(self)) {
+            return self->search.input;
+        }
+#endif
         hystgen_inverse_advance(&self->search);
 #ifdef HYSTGEN_HAS_PLAIN_PLAYS
         hystgen_inverse_release(self, self->search.input);
+#endif
+#ifdef HYSTGEN_HAS_ELEMENTS
+        hystgen_inverse_approach(self, self->search.input);
 #endif
         self->search.found = hystgen_inverse_sum(self, self->search.input);
     }
@@ -158,6 +238,7 @@ static inline void hystgen_inverse_try(hystgen_inverse_t *self, hystgen_attempt_
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_inverse_tries(self, at, i); ++i) {
     }
+    at->first = i;
     at->sum = hystgen_with_staying(i, self->play, bent, at->sum);
 #else
     HYSTGEN_ROLLED
@@ -185,6 +266,26 @@ static inline hystgen_real_t hystgen_led(hystgen_real_t left, hystgen_real_t slo
     }
     return left * rate;
 }
+
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+/* Whether one more step along the slope leads from the input tried to the solution: the elements
+   bend little on the way, and no play starts or stops to move. Goes there. */
+static bool hystgen_inverse_lands(const hystgen_inverse_t *self, hystgen_attempt_t *at) {
+    const hystgen_real_t left = at->asked - at->sum;
+    const hystgen_real_t from = at->input;
+    const unsigned int first = at->first;
+    if (!(left < HYSTGEN_SMOOTH && left > -HYSTGEN_SMOOTH) || !self->moving) {
+        return false;
+    }
+    at->input = from + hystgen_led(left, at->slope);
+    if ((first == 1u || hystgen_tried(self, at, first - 1u)) &&
+        (first > HYSTGEN_N_PLAYS || !hystgen_tried(self, at, first))) {
+        return true;
+    }
+    at->input = from;
+    return false;
+}
+#endif
 
 /* Goes on from try k to the next input: by the slope there, if it leads to an input inside the
    interval and k is not too large; else to the middle. A wrong slope costs only tries. Returns
@@ -233,7 +334,9 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hyst
     hystgen_attempt_t at;
     unsigned int k;
 #ifdef HYSTGEN_HAS_ELEMENTS
-    (void)hystgen_inverse_turns(self, h);
+    if (hystgen_inverse_turns(self, h)) {
+        self->search.slope = hystgen_inverse_turned_slope(self);
+    }
 #endif
     at.low = HYSTGEN_LEAST_INPUT;
     at.high = HYSTGEN_LARGEST_INPUT;
@@ -244,8 +347,19 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_input(hystgen_inverse_t *self, hyst
     at.steady = at.slope;
     for (k = 0; !hystgen_inverse_solves(&at, k); ++k) {
         hystgen_inverse_try(self, &at);
+#ifdef HYSTGEN_HAS_SMOOTH_SUM
+        if (hystgen_inverse_lands(self, &at)) {
+            break;
+        }
+#endif
     }
     self->search.slope = at.steady;
+#ifdef HYSTGEN_HAS_ELEMENTS
+    if (k < HYSTGEN_NEWTON_TRIES + HYSTGEN_HALVES) { /* the sum there is h but for rounding */
+        self->found = at.input;
+        self->asked = h;
+    }
+#endif
     return at.input;
 }
 #endif

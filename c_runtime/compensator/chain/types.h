@@ -116,15 +116,17 @@ typedef struct {
     uint8_t lift;  /* bits of a value that the product with `share` needs in addition */
 } hystgen_piece_t;
 
-/* An element: factors from a move of the input, of at most `far`, to a distance on the curve, and
-   from there to the sum, with left shifts of the argument of the first and of the product of the
-   second. */
+/* An element: factors from a move of the input, at most `far`, to a distance on the curve, from
+   there to the sum, and from a slope of the curve to that of the sum, with left shifts of the
+   argument of the first and of the products of the others. */
 typedef struct {
     hystgen_factor_t distance;
     hystgen_factor_t amplitude;
+    hystgen_factor_t weight;
     int64_t far;
     uint8_t distance_lift;
     uint8_t amplitude_lift;
+    uint8_t weight_lift;
 } hystgen_element_table_t;
 
 /* An element in parallel with the plays, at the last turn of its input. */

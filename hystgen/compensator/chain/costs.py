@@ -10,7 +10,7 @@ from hystgen.plays import slots
 
 OWN = {
     "preview": "inverse", "quiet": "inverse", "slew": "", "braked": "", "tanh": "", "dead_zone": "", "relaxing": "",
-    "dilated": "", "dashpot": "", "polynomial": "", "centre": "",
+    "dilated": "", "dashpot": "", "polynomial": "", "centre": "", "elements": "",
 }
 """Parts of the code that belong to no block, and the operator if only one has the part. `dilated`: for all plays whose
 input is found by a search; `braked`: for a block and a slew limit; `quiet`: for a drive that stands still at rest."""
@@ -37,6 +37,7 @@ def found(t: ChainTables, operator: str) -> list[str]:
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == DASHPOT,
         "polynomial": t.moving.bends == POLYNOMIAL, "centre": t.moving.bends == CENTRE,
+        "elements": len(t.moving.elements.element),
     }
     for part, tables, blocks in zip(parts.PARTS, t.blocks, t.counts.tolist(), strict=True):
         counts |= zip(part.code, part.counted(tables, blocks), strict=True)

@@ -29,6 +29,7 @@ from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
 from hystgen.compensator.chain.layout import ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
+    STRAIGHTNESS,
     Bumps,
     least_dilated,
     least_slope,
@@ -232,7 +233,10 @@ class Bounds:
         slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # rounded weights of the bends
         shifted, counting = of_shifts(self.static, self.parts.plays, t.moves, np.array(plays))
         bumps = math.fsum(map(abs, self.static.pi.weights[1:])) * self.bumps.error * step
-        bumps += sum(each.coded_error() for each in parallel(self.static, self.parts.plays))
+        joined = parallel(self.static, self.parts.plays)
+        bumps += sum(each.coded_error() for each in joined)
+        if joined:
+            bumps += least_slope(self.static, self.parts.plays) * 0.5 * step / STRAIGHTNESS
         lsb = float(self.inner.output_lsb)
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 

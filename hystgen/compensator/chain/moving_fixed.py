@@ -9,7 +9,7 @@ from hystgen.compensator.chain.layout import FixedChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators, unmoved
 from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import FASTEST, SECANTS, FixedMovingTables
+from hystgen.effects.plays import FASTEST, PLAIN, SECANTS, STRAIGHT, FixedMovingTables
 from hystgen.plays.fixed import loop_solve, nearest, quotient
 from hystgen.plays.slots import Reals
 
@@ -30,7 +30,21 @@ def input_after(m: FixedMovingTables, w: int, left: int, rate: int) -> int:
     return w + step if left > 0 else w - step
 
 
-def search(sum_at: Callable[..., int], _: object) -> Answer:
+@jit
+def rate_of(m: FixedMovingTables, way: int, gained: int) -> int:
+    """The rate of an input that has gone `way` while the sum has gained this."""
+    return min(max(quotient(way, max(gained, 1), m.rate_bits), 1), FASTEST)
+
+
+@jit
+def smooth(m: FixedMovingTables) -> bool:
+    """Whether plays that are not bent are summed up with elements in parallel."""
+    return m.moves == PLAIN and m.bends == STRAIGHT and len(m.elements.element) > 0
+
+
+def search(
+    sum_at: Callable[..., int], _: object, alike: Callable[..., bool], slope_at: Callable[..., int]
+) -> Answer:
     """The search of `moving_search.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
@@ -61,8 +75,18 @@ def search(sum_at: Callable[..., int], _: object) -> Answer:
             if high - low == 1:
                 return high if short > over else low
             way = size(w - before)
-            if tries < SECANTS and way > 0:
-                s.search.rate[0] = min(max(quotient(way, max(size(total - last), 1), m.rate_bits), 1), FASTEST)
+            if smooth(m):
+                if tries < SECANTS and (tries > 0 or s.elements.steep[0] < 0):
+                    slope = slope_at(t, s, w)
+                    if slope != s.elements.steep[0]:
+                        s.elements.steep[0] = slope
+                        s.search.rate[0] = rate_of(m, 1, slope)
+                    to = input_after(m, w, left, s.search.rate[0])
+                    on = size(to - s.elements.found[0])
+                    if not s.elements.departs[0] and on <= m.elements.straight and alike(t, s, w, to):
+                        return to if size(left - slope * (to - w)) < size(left) else w
+            elif tries < SECANTS and way > 0:
+                s.search.rate[0] = rate_of(m, way, size(total - last))
             before = w
             last = total
             if tries < SECANTS:
@@ -91,6 +115,19 @@ def asked(t: FixedChainTables, h: int) -> int:
 def begin(s: ChainState, _: Reals) -> None:
     """Set the rate with which the first search begins: the largest."""
     s.search.rate[0] = FASTEST
+    s.elements.steep[0] = 0
+
+
+@jit(inline=True)
+def found(m: FixedMovingTables, s: ChainState, w: int) -> bool:  # noqa: ARG001  as in floating point
+    """False: a sum is exact, so that it does not matter where it was computed."""
+    return False
+
+
+@jit(inline=True)
+def turned(t: FixedChainTables, s: ChainState) -> None:  # noqa: ARG001  as in floating point
+    """A search begins with the rate right after the turn."""
+    s.elements.steep[0] = -1
 
 
 @jit(inline=True)
@@ -99,6 +136,8 @@ def ordered(_: FixedMovingTables) -> bool:
     return False
 
 
-KIND = Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, ordered)
+KIND = Kind(
+    level, asked, loop_solve, MOVES.coded(), BENDS.coded(), ELEMENTS.coded(), search, begin, found, turned, ordered
+)
 PLAYS = operators(KIND)
 UNMOVED = unmoved(KIND)

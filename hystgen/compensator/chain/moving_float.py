@@ -14,13 +14,17 @@ from hystgen.plays.loop import loop_solve
 from hystgen.plays.slots import Reals
 
 
-def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> Answer:
-    """The search of `moving_search.c`, from the function that gives the sum of the plays at an input and its slopes."""
+def search(
+    _: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]], alike: Callable[..., bool], *__: object
+) -> Answer:
+    """The search of `moving_search.c`, from the functions that give the sum of the plays at an input and its slopes,
+    and tell whether the same plays follow to two inputs."""
 
     @jit
     def searched(t: FloatChainTables, s: ChainState, h: Scalar) -> Scalar:
         """Input of the plays at which their sum is h: by Newton's method, from the input extrapolated with the slope of
-        the last search, within the interval that remains, then by bisection."""
+        the last search, within the interval that remains, then by bisection. With elements, the input and h are kept
+        for the move there."""
         number, m = t.moving.number, t.moving
         low: Scalar = number.least_input[0]
         high: Scalar = number.largest_input[0]
@@ -31,9 +35,20 @@ def search(_: object, sum_at: Callable[..., tuple[Scalar, Scalar, Scalar]]) -> A
                 w = low + (high - low) * number.half[0]
             total, slope, steady = sum_at(t, s, w)
             left = h - total
+            if left < number.smooth[0] and left > -number.smooth[0] and s.own.moving[0]:
+                lands = w + left * inverse(t, slope)
+                if alike(t, s, w, lands):
+                    s.search.slope[0] = steady
+                    s.elements.found[0] = lands
+                    s.elements.asked[0] = h
+                    return lands
             if (left <= number.close[0] and left >= -number.close[0]) or k == at.NEWTON_TRIES + m.halves:
                 s.search.slope[0] = steady
-                return w + left * (inverse(t, slope) if m.moves == at.DASHPOT else number.rate[0])
+                w = w + left * (inverse(t, slope) if m.moves == at.DASHPOT else number.rate[0])
+                if len(m.elements.element) > 0 and k < at.NEWTON_TRIES + m.halves:
+                    s.elements.found[0] = w  # the sum there is h but for rounding
+                    s.elements.asked[0] = h
+                return w
             if left > zero(left):
                 low = w
             else:
@@ -65,6 +80,23 @@ def begin(s: ChainState, p: Reals) -> None:
     s.search.slope[0] = p[0]
 
 
+@jit
+def found(m: at.MovingTables, s: ChainState, w: Scalar) -> bool:
+    """Whether the last search has led to w, so that the sum there is known. Forgets where it has led."""
+    led = s.own.inverse[0] != 0 and w == s.elements.found[0]
+    s.elements.found[0] = m.number.largest_input[0]
+    return bool(led)
+
+
+@jit
+def turned(t: FloatChainTables, s: ChainState) -> None:
+    """Set the slope with which a search begins right after a turn, when no play follows."""
+    slope = t.plays.weight[0]
+    for j in range(len(t.moving.elements.element)):
+        slope = slope + t.moving.elements.element.weight[j] * s.elements.element.c[j, 0]
+    s.search.slope[0] = slope
+
+
 @jit(inline=True)
 def ordered(m: at.MovingTables) -> bool:
     """Whether a sum assumes that plays behind the first stationary one are stationary too: yes if they keep the order
@@ -72,6 +104,8 @@ def ordered(m: at.MovingTables) -> bool:
     return m.moves in (at.PLAIN, at.DASHPOT)
 
 
-KIND = Kind(same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, ordered)
+KIND = Kind(
+    same, same, loop_solve, MOVES.floating, BENDS.floating, ELEMENTS.floating, search, begin, found, turned, ordered
+)
 PLAYS = operators(KIND)
 UNMOVED = unmoved(KIND)

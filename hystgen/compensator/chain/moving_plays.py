@@ -22,8 +22,10 @@ class Kind(NamedTuple):
     moves: Moves  # plays that an effect moves
     bends: Bending  # plays that an effect bends
     elements: Elements  # those in parallel with the plays
-    search: Function  # of functions from input to sum, and to sum and slopes: the function that finds the input
+    search: Function  # of `sum_at`, `tried_at`, `alike` and `slope_at` below: the function that finds the input
     begin: Function  # of state and weights: sets the slope or rate with which the first search begins
+    found: Function  # of moving tables, state and input: whether a search has just led there; forgets it
+    turned: Function  # of tables and state: sets the same right after elements have turned
     ordered: Function  # of moving tables: whether a sum assumes that plays behind the first stationary one are too
 
 
@@ -60,7 +62,7 @@ def unmoved(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """The same functions for models with an effect that moves, bends or joins plays."""
-    level, asked, solve, moves, (bent, steep), (joined, turn, unload), search, begin, ordered = kind
+    level, asked, solve, moves, (bent, steep), (joined, turn, unload), search, begin, found, turned, ordered = kind
     moved, move, put, rests, relaxing_follow, relaxing_input, tried = moves
 
     @jit
@@ -114,14 +116,16 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return total, slope, steady
 
     @jit
-    def elements_follow(m: Any, s: ChainState, w: Scalar, none: Any) -> Any:
-        """Move the elements in parallel with the plays while their input goes to w. Returns their sum."""
+    def elements_follow(m: Any, s: ChainState, w: Scalar) -> bool:
+        """Turn the elements in parallel with the plays if their input, on its way to w, turns. Returns whether they
+        do."""
         if len(m.elements.element) == 0:
-            return none
+            return False
         before = s.plays.play[0]
-        if w != before and (w > before) != (s.elements.upward[0] == 1):
+        turns = w != before and (w > before) != (s.elements.upward[0] == 1)
+        if turns:
             turn(m.elements, s.elements, before)
-        return joined(m.elements, s.elements, w)[0]
+        return bool(turns)
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Scalar) -> Any:
@@ -157,6 +161,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         m, plays, play = t.moving, t.plays, s.plays.play
         if len(m.elements.element) > 0:
             unload(m.elements, s.elements, w)
+            found(m, s, w)
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         begin(s, p)
@@ -167,7 +172,31 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         play[0] = w
         return total
 
-    searched = search(sum_at, tried_at)
+    @jit
+    def follows(t: ChainTables, s: ChainState, i: int, w: Scalar) -> bool:
+        """Whether plain play i moves with the input at w; beyond the last play, none does."""
+        r, play = t.plays.threshold, s.plays.play
+        return i < len(r) and resting(r, s.plays, i, w) != play[i]
+
+    @jit
+    def alike(t: ChainTables, s: ChainState, w: Scalar, other: Scalar) -> bool:
+        """Whether the same plain plays move to either input; they do so in the order of their thresholds."""
+        first = 1
+        while follows(t, s, first, w):
+            first += 1
+        return (first == 1 or follows(t, s, first - 1, other)) and not follows(t, s, first, other)
+
+    @jit
+    def slope_at(t: ChainTables, s: ChainState, w: Scalar) -> Scalar:
+        """In fixed point, the slope of the sum of plain plays and elements at the input tried last, w."""
+        slope: Scalar = t.plays.weight[0] + s.elements.slope[0]
+        i = 1
+        while follows(t, s, i, w):
+            slope = slope + t.plays.weight[i]
+            i += 1
+        return slope
+
+    searched = search(sum_at, tried_at, alike, slope_at)
 
     @jit
     def follow(t: ChainTables, s: ChainState, w: Scalar) -> Any:
@@ -179,10 +208,14 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
         if s.own.moving[0]:
-            joining = elements_follow(m, s, w, w - w)
-            total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w) + joining
+            turns = elements_follow(m, s, w)
+            total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w)
+            summed = level(t, total)
+            if len(m.elements.element) > 0:
+                known = found(m, s, w) and not turns
+                summed = s.elements.asked[0] if known else level(t, total + joined(m.elements, s.elements, w)[0])
             relax(m, t.plays, s.plays, s.bent)
-            return level(t, total)
+            return summed
         return level(t, moved_rest(t, s, w))
 
     @jit
@@ -205,6 +238,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         here = s.plays.step.level[0]
         if len(m.elements.element) > 0 and s.own.moving[0] and h != here and (h > here) != (s.elements.upward[0] == 1):
             turn(m.elements, s.elements, s.plays.play[0])
+            turned(t, s)
         return searched(t, s, total)
 
     return start, follow, started, inverse_input

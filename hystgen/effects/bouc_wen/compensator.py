@@ -19,6 +19,7 @@ from hystgen.effects.plays import (
     ElementsState,
     ElementState,
     ElementTables,
+    FixedElementTables,
     ParallelTerms,
 )
 
@@ -81,6 +82,7 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
     weights, widths = np.array(effect.weights), np.array(effect.widths)
     most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
     steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
+    bend = exponent * max(1.0, 2.0 * balance - 1.0) * steepest / widths  # as |s| <= 1
 
     def polynomials(dtype: Any) -> CurvePieces:
         return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
@@ -100,9 +102,15 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
         return ElementTables(np.array(rows, dtype=dtype), ElementNumbers.of(numbers, dtype))
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
+
+    def straight(step: float, unit: float, off: float) -> FixedElementTables:
+        most = float(np.abs(weights) @ bend)
+        found: FixedElementTables = coded[0]()(effect, step, unit, math.sqrt(2.0 * off / most) if most else math.inf)
+        return found
+
     return ParallelTerms(
-        weights, most * widths, steepest, LoadedElements(effect), tables, error,
-        lambda step, unit: coded[0]()(effect, step, unit), lambda: coded[1]()(effect),
+        weights, most * widths, steepest, bend, LoadedElements(effect), tables, error,
+        straight, lambda: coded[1]()(effect),
     )
 
 

@@ -11,10 +11,12 @@
 #ifdef HYSTGEN_HAS_ELEMENTS
 #ifdef HYSTGEN_FIXED
 /* Numbers of pieces and elements: places and z/width have 44 bits, mean slopes HYSTGEN_SLOPE bits,
-   and shares of a piece over shares of its rise HYSTGEN_BACK bits. */
+   shares of a piece over shares of its rise HYSTGEN_BACK bits, and slopes HYSTGEN_STEEP bits less
+   than mean slopes. */
 #define HYSTGEN_CURVE_DEGREE 5u
 #define HYSTGEN_SLOPE 27u
 #define HYSTGEN_BACK 28u
+#define HYSTGEN_STEEP 3u
 
 /* x times a slope. */
 static int64_t hystgen_by_slope(int64_t x, int32_t slope) {
@@ -37,6 +39,19 @@ static int32_t hystgen_mean_slope(const int32_t *c, int32_t h) {
         slope = c[k - 1u] + hystgen_piece_part(slope, h);
     }
     return slope;
+}
+
+/* The same, the mean slope of C from the begin of a piece on. Sets the slope of C. */
+static int32_t hystgen_slopes(const int32_t *c, int32_t h, int32_t *slope) {
+    int32_t mean = c[HYSTGEN_CURVE_DEGREE - 1u];
+    int32_t steep = mean >> HYSTGEN_STEEP;
+    unsigned int k;
+    for (k = HYSTGEN_CURVE_DEGREE - 1u; k > 0; --k) {
+        mean = c[k - 1u] + hystgen_piece_part(mean, h);
+        steep = hystgen_piece_part(steep, h) + (mean >> HYSTGEN_STEEP);
+    }
+    *slope = steep;
+    return mean;
 }
 
 /* A distance x >= 0 from the begin of a piece, over its length, in units of 2^-31. */
@@ -71,23 +86,25 @@ static int64_t hystgen_element_distance(unsigned int j, int64_t way) {
     return hystgen_times(inside * ((int64_t)1 << t->distance_lift), &t->distance);
 }
 
-/* z/width of an element at the distance x since its last turn. Backwards, where a search may try
-   inputs, the curve goes on straight. */
-static int64_t hystgen_element_at(const hystgen_element_t *e, int64_t x) {
+/* z/width of an element at the distance x since its last turn. Sets the slope of C. Backwards,
+   where a search may try inputs, the curve goes on straight. */
+static int64_t hystgen_element_at(const hystgen_element_t *e, int64_t x, int32_t *slope) {
     if (x < 0) {
+        *slope = e->c[0] >> HYSTGEN_STEEP;
         return e->s + hystgen_by_slope(x, e->c[0]);
     }
     if (x < e->until) {
-        return e->s +
-               hystgen_by_slope(x, hystgen_mean_slope(e->c, hystgen_piece_share(x, e->scale)));
+        const int32_t h = hystgen_piece_share(x, e->scale);
+        return e->s + hystgen_by_slope(x, hystgen_slopes(e->c, h, slope));
     }
     const unsigned int i = hystgen_piece_at(false, e->place + x);
     const hystgen_piece_t *piece = &hystgen_piece[i];
     int64_t value = piece->level;
+    *slope = 0;
     if (i + 1u < HYSTGEN_PIECES) {
         const int64_t on = e->place + x - piece->begin;
         const int32_t h = hystgen_piece_share(on, piece->scale);
-        value += hystgen_by_slope(on, hystgen_mean_slope(piece->up, h));
+        value += hystgen_by_slope(on, hystgen_slopes(piece->up, h, slope));
     }
     return e->s + (value - e->level);
 }
@@ -138,7 +155,8 @@ static void hystgen_element_unload(hystgen_element_t *e) {
 static void hystgen_element_turn(hystgen_element_t *e, int64_t x) {
     const unsigned int end = HYSTGEN_PIECES - 1u;
     const int64_t last = hystgen_piece[end].level;
-    const int64_t s = hystgen_element_at(e, x);
+    int32_t slope;
+    const int64_t s = hystgen_element_at(e, x, &slope);
     e->s = -s;
     if (s > last) {
         e->s = -last;
@@ -148,11 +166,26 @@ static void hystgen_element_turn(hystgen_element_t *e, int64_t x) {
     hystgen_element_put(e);
 }
 
-/* Contribution of element j to the sum at the distance x since its last turn. */
-static inline int64_t hystgen_element_part(unsigned int j, const hystgen_element_t *e, int64_t x) {
+/* The slope of the sum that results from a slope of C. */
+static inline int64_t hystgen_element_slope(unsigned int j, int32_t slope) {
     const hystgen_element_table_t *t = &hystgen_element_table[j];
-    return hystgen_times(hystgen_element_at(e, x), &t->amplitude) *
-           ((int64_t)1 << t->amplitude_lift);
+    return hystgen_short_times(slope, &t->weight) * ((int64_t)1 << t->weight_lift);
+}
+
+/* The same right after a turn. */
+static inline int64_t hystgen_element_turned(unsigned int j, const hystgen_element_t *e) {
+    return hystgen_element_slope(j, e->c[0] >> HYSTGEN_STEEP);
+}
+
+/* Contribution of element j to the sum at the distance x since its last turn. Adds to the sum's
+   slope. */
+static inline int64_t hystgen_element_part(unsigned int j, const hystgen_element_t *e, int64_t x,
+                                           int64_t *slope) {
+    const hystgen_element_table_t *t = &hystgen_element_table[j];
+    int32_t steep;
+    const int64_t s = hystgen_element_at(e, x, &steep);
+    *slope += hystgen_element_slope(j, steep);
+    return hystgen_times(s, &t->amplitude) * ((int64_t)1 << t->amplitude_lift);
 }
 #else
 /* Degree of the polynomials of C and of its inverse. */

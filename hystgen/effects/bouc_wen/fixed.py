@@ -37,6 +37,12 @@ SLOPE = 27
 BACK = 28
 """Bits of shares of a piece over shares of its rise."""
 
+STEEP = 3
+"""Bits of a slope that its computation drops, as it sums up up to `DEGREE` times as much as the curve's."""
+
+FARTHEST = 2**24
+"""[steps] Largest distance over which the sum is computed along its slope, which has at most 38 bits."""
+
 DEGREE = 5
 """Degree of the curve's polynomials."""
 
@@ -52,8 +58,9 @@ def _pieces(exponent: float, balance: float) -> CurvePieces:
     return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
 
 
-def of(effect: BoucWenElements | DahlElements, step: float, unit: float) -> FixedElementTables:
-    """Tables for inputs in steps of `step` and a sum in steps of `unit`. Raises OverflowError."""
+def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straight: float) -> FixedElementTables:
+    """Tables for inputs in steps of `step` and a sum in steps of `unit`, straight over a distance. Raises
+    OverflowError."""
     found = _pieces(*effect.law)
     wide = np.diff(found.begin)
     scale = UNIT - 32 + np.frexp(wide)[1]  # lengths are powers of 2
@@ -76,6 +83,7 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float) -> Fixe
     ratio = 2.0**UNIT * step / widths
     distance, distance_lift = scaled(ratio)
     amplitude, amplitude_lift = scaled(weights * widths / unit / 2.0**UNIT)
+    weight, weight_lift = scaled(weights * step / unit / 2.0 ** (SLOPE - STEEP))
     begin, level = (np.rint(np.ldexp(each, UNIT)).astype(np.int64).tolist() for each in (found.begin, found.level))
     far = np.minimum(np.floor(FAR / ratio), 2**40).astype(np.int64).tolist()
     level_on = [[0] * DEGREE]  # behind the last piece
@@ -83,8 +91,9 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float) -> Fixe
         begin, level, [*share, (0, 21)], [*up.tolist(), *level_on], [*back.tolist(), *level_on],
         [*scale.tolist(), 0], [*lift, 0], strict=True,
     )
-    elements = zip(distance, amplitude, far, distance_lift, amplitude_lift, strict=True)
-    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements))
+    elements = zip(distance, amplitude, weight, far, distance_lift, amplitude_lift, weight_lift, strict=True)
+    most = math.floor(min(straight / step, FARTHEST))
+    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), most)
 
 
 def error(effect: BoucWenElements | DahlElements) -> float:
@@ -134,26 +143,31 @@ def distance(t: FixedElementTables, j: int, way: int) -> int:
 
 
 @jit
-def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x: int) -> int:
-    """Change of s of element j over the distance x since its last turn; backwards the curve goes on straight."""
+def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x: int) -> tuple[int, int]:
+    """Change of s of element j over the distance x since its last turn, and the curve's slope there without its `STEEP`
+    lowest bits; backwards the curve goes on straight."""
     n = m.element.c.shape[1]
     if x < 0:
-        return times(x, m.element.c[j, 0], SLOPE)
+        return times(x, m.element.c[j, 0], SLOPE), m.element.c[j, 0] >> STEEP
     if x < m.element.until[j]:
         h = share_of(x, m.element.scale[j])
         slope = m.element.c[j, n - 1]
+        steep = slope >> STEEP
         for k in range(n - 2, -1, -1):
             slope = m.element.c[j, k] + part(slope, h)
-        return times(x, slope, SLOPE)
+            steep = part(steep, h) + (slope >> STEEP)
+        return times(x, slope, SLOPE), steep
     i = piece_at(t.piece.begin, m.element.place[j] + x)
     on = m.element.place[j] + x - t.piece.begin[i]
     if i == len(t.piece) - 1:
-        return t.piece.level[i] - m.element.level[j]
+        return t.piece.level[i] - m.element.level[j], 0
     h = share_of(on, t.piece.scale[i])
     slope = t.piece.up[i, n - 1]
+    steep = slope >> STEEP
     for k in range(n - 2, -1, -1):
         slope = t.piece.up[i, k] + part(slope, h)
-    return t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j]
+        steep = part(steep, h) + (slope >> STEEP)
+    return t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j], steep
 
 
 @jit
@@ -183,6 +197,24 @@ def put(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, s: i
 
 
 @jit
+def sloped(t: FixedElementTables, j: int, slope: int) -> int:
+    """The slope of the sum that results from a slope of the curve of element j."""
+    by = t.element.weight
+    return times(slope, by.mantissa[j], by.shift[j]) << t.element.weight_lift[j]
+
+
+@jit
+def depart(t: FixedElementTables, m: ElementsState[FixedElementState], w: int, total: int) -> None:
+    """Let the elements depart from the input w, where this is their sum, in a new direction."""
+    m.found[0] = w
+    m.asked[0] = total
+    m.slope[0] = 0
+    m.departs[0] = 1
+    for j in range(len(t.element)):
+        m.slope[0] = m.slope[0] + sloped(t, j, m.element.c[j, 0] >> STEEP)
+
+
+@jit
 def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
     """Bring every element to rest at z = 0, with its input at w."""
     m.turned[0] = w
@@ -190,6 +222,7 @@ def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -
     for j in range(len(t.element)):
         m.element.s[j] = 0
         put(t, m, j, 0)
+    depart(t, m, w, 0)
 
 
 @jit
@@ -198,23 +231,41 @@ def turn(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> 
     way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
     last = t.piece.level[len(t.piece) - 1]
     for j in range(len(t.element)):
-        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))
+        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))[0]
         m.element.s[j] = -min(max(s, -last), last)
         put(t, m, j, m.element.s[j])
     m.turned[0] = w
     m.upward[0] = 1 - m.upward[0]
+    depart(t, m, w, m.asked[0] + m.slope[0] * (w - m.found[0]))
+
+
+@jit
+def approach(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
+    """Compute the sum of the elements with their input at w, and its slope."""
+    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
+    total = 0
+    slope = 0
+    for j in range(len(t.element)):
+        more, steep = gained(t, m, j, distance(t, j, way))
+        size = t.element.amplitude
+        s = m.element.s[j] + more
+        total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
+        slope = slope + sloped(t, j, steep)
+    m.found[0] = w
+    m.asked[0] = total if m.upward[0] else -total
+    m.slope[0] = slope
+    m.departs[0] = 0
 
 
 @jit
 def joined(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> tuple[int, int]:
-    """The sum of the elements with their input at w."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    total = 0
-    for j in range(len(t.element)):
-        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))
-        size = t.element.amplitude
-        total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
-    return (total if m.upward[0] else -total), 0
+    """The sum of the elements with their input at w: along the slope at the input for which it was last computed, or
+    computed there if that is not near or they have turned since."""
+    on = w - m.found[0]
+    if on != 0 and (m.departs[0] or on > t.straight or on < -t.straight):
+        approach(t, m, w)
+        on = 0
+    return m.asked[0] + m.slope[0] * on, 0
 
 
 ARITHMETIC = Elements(joined, turn, unload)
