@@ -385,9 +385,10 @@ class ChainPart:
     interface calls that it serves; `forward`: only the forward operator has it; `joined`: all its blocks are merged
     into one in C; `coded`: loads its fixed-point version, for models in fixed point.
 
-    `longest`: the longest travel that can be set, from its tables. `problems`: why the C cannot include an effect;
-    `unmeasured`: set if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and
-    `counted`: how many of each its tables contain, by default its blocks.
+    `longest`: the longest travel that can be set, from its tables; `unreached`: largest error of these tables, as a
+    fraction of the output. `problems`: why the C cannot include an effect; `unmeasured`: set if nothing measures it;
+    `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`: how many of each its tables contain,
+    by default its blocks.
 
     In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of an effect
     behind the plays that depends on the drive; `no_inverse`: why there is no inverse.
@@ -404,6 +405,7 @@ class ChainPart:
     forward: bool = False
     joined: bool = False
     longest: Callable[..., float] | None = None
+    unreached: float = 0.0
     problems: Callable[..., Iterator[str]] = lambda *_: iter(())
     unmeasured: Unmeasured | None = None
     code: tuple[str, ...] = ()

@@ -301,18 +301,6 @@ static double argument(const effects_probe_t *q, double x, double lsb) {
     return q->kind == EFFECTS_FIXED ? nearbyint(x / lsb) : q->kind == EFFECTS_F32 ? (double)(float)x : x;
 }
 
-/* What the table of an ageing gain adds to the error of an inverse whose header states a measured error alone, as with
-   elements: a record meets its largest error only after long travel, while the forward operator states a bound. */
-static double aged_error(const effects_model_t *m, const effects_probe_t *q) {
-    const double lsb = q->kind == EFFECTS_FIXED ? q->output_lsb : 1;
-    double least = m->weight[0];
-    int i;
-    for (i = 0; i < m->elements; ++i) {
-        least += fmin(m->part[i], 0) * 2 * m->balance;
-    }
-    return m->ages && m->elements ? q->forward_bound * lsb / least : 0;
-}
-
 void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const effects_call_t *call, long n,
                      double shrink, effects_result_t *out) {
     plant_t p;
@@ -323,7 +311,7 @@ void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const e
     const double bit = q->kind == EFFECTS_FIXED ? lsb : (double)far * (q->kind == EFFECTS_F32 ? 0x1p-23 : 0x1p-52);
     const int ahead = (int)ceil(m->delay / m->seconds);
     const real part = ahead ? (real)m->delay / (real)m->seconds - (ahead - 1) : 0;
-    const double bound = q->inverse_bound * lsb * shrink, rounding = (q->rounding_bound * lsb + aged_error(m, q)) * shrink;
+    const double bound = q->inverse_bound * lsb * shrink, rounding = q->rounding_bound * lsb * shrink;
     bool has_pending = false, filled = false, committed = false;
     long references = 0, k;
     void *self = calloc(1, q->inverse_size);

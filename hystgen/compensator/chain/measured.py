@@ -15,6 +15,8 @@ import numpy as np
 from hystgen.basics import jit
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.moving import least_slope
+from hystgen.compensator.chain.parts import BEHIND
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects.base import Array, Run
@@ -47,7 +49,8 @@ class Measured:
 def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     """The largest error of the inverse against the compensator in double precision, from the start memory on, for
     references over the whole range of the output: triangular loops and multisines at `SPEEDS`; logged columns stay at
-    the value at which their effect changes nothing."""
+    the value at which their effect changes nothing. Errors of tables that the references do not reach, but a caller who
+    sets the travel does, are added as they are known."""
     t, codes = compiled.tables, compiled.codes
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
     ends = float(t.limits.drive.low[0]) * drive, float(t.limits.drive.high[0]) * drive
@@ -66,7 +69,9 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
         known = len(given) - compiled.ahead
         worst = max(worst, float(np.max(np.abs(found - wanted)[:known], initial=0.0)))
         count += known
-    return Measured(_upward(worst), count)
+    unreached = sum(part.unreached for part in BEHIND if compiled.ones[part.name])
+    slope = compiled.static.front_slopes[0] * least_slope(compiled.static, compiled.parts.plays)
+    return Measured(_upward(worst + unreached * max(abs(low), abs(high)) * output / slope / drive), count)
 
 
 def _upward(x: float) -> float:

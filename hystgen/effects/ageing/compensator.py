@@ -337,6 +337,7 @@ PART = ChainPart(
     "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
     problems=problems, code=("ageing",), following=UnevenAgeing, longest=lambda t: float(t.block.last[0]),
+    unreached=TABLE_ERROR,
 )
 """Ageing as a part of the chain: a gain that depends on the travel, which the caller may set."""
 
