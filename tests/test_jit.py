@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from modelfiles import CHAINS, FILES
+from numpy.typing import NDArray
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
@@ -21,6 +22,7 @@ from hystgen.basics import extras
 from hystgen.basics import jit as jitting
 from hystgen.basics.jit import Jit, jit, plain
 from hystgen.basics.structures import Real, Struct, TwoReals
+from hystgen.compensator import reference
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -168,21 +170,48 @@ def test_numbers_that_are_no_integers_are_refused_outside_of_arrays() -> None:
 
 
 def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first samples of each function and type run as Python; later ones and all of a long record run compiled."""
+    """The first samples of each function and type run as Python; later ones and all of a long record run compiled, and
+    so do all after them and before them, if it is known that they follow."""
 
-    def as_python(samples: int, dtype: type[np.generic] = np.float64, function: Jit[..., Any] = tripled) -> bool:
-        with jitting.for_samples(function, np.zeros(samples, dtype)):
+    def as_python(
+        samples: int, dtype: type[np.generic] = np.float64, function: Jit[..., Any] = tripled, following: int = 0
+    ) -> bool:
+        with jitting.for_samples(function, np.zeros(samples, dtype), following):
             return jitting._plain.get()
 
     monkeypatch.setattr(jitting, "_samples", Counter())
     some = jitting.SHORT // 2
-    assert not as_python(jitting.SHORT + 1)
     with jitting.plain():  # inside it, all samples run as Python
         assert as_python(jitting.SHORT + 1)
         assert all(as_python(some) for _ in range(3))
     assert [as_python(some) for _ in range(3)] == [True, True, False]
-    assert as_python(some, np.float32)
-    assert as_python(some, function=sixfold)
+    assert as_python(some, np.float32, following=some)
+    assert not as_python(some, np.float32, following=1)
+    assert [as_python(each, function=sixfold) for each in (some, jitting.SHORT, 1)] == [True, False, False]
+
+
+def test_a_suite_runs_as_python_as_a_whole_or_not_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function that is to be compiled for the last of many records is compiled for the first, and stays compiled."""
+    tables, length, ran = Model(parse_parameters(FILES["plain"])).tables("float64", "corners"), 50, []
+    mine, choose = reference.operations(tables, True).run, jitting.for_samples
+
+    def chosen(function: Jit[..., Any], x: NDArray[Any], following: int = 0) -> Any:
+        context = choose(function, x, following)
+        ran.append((function, isinstance(context, contextlib.nullcontext)))
+        return context
+
+    monkeypatch.setattr(jitting, "for_samples", chosen)
+    monkeypatch.setattr(jitting, "_has_numba", lambda: False)  # it is the choice that counts here
+    compiled, records = [], expected_records(tables, np.dtype(np.float64), True, length)
+    assert len(records) > 10
+    for less in (0, 1):
+        monkeypatch.setattr(jitting, "SHORT", length * len(records) - less)
+        monkeypatch.setattr(jitting, "_samples", Counter())
+        ran.clear()
+        expected_records(tables, np.dtype(np.float64), True, length)
+        compiled.append([how for function, how in ran if function is mine])
+        assert len(compiled[-1]) == len(records)
+    assert [set(each) for each in compiled] == [{False}, {True}]
 
 
 def test_a_factory_makes_functions_of_what_it_is_given() -> None:

@@ -99,14 +99,18 @@ def plain() -> Iterator[None]:
 
 
 def for_samples(
-    function: Callable[..., object], samples: NDArray[np.generic]
+    function: Callable[..., object], samples: NDArray[np.generic], following: int = 0
 ) -> contextlib.AbstractContextManager[None]:
-    """`plain` until `function` has been given `SHORT` samples of this type outside of `plain`, then a null context."""
-    key = function, samples.dtype
-    if _plain.get() or _samples[key] + len(samples) > SHORT:
+    """`plain` until `function` has been given `SHORT` samples of this type outside of `plain`, then a null context.
+
+    `following`: number of samples that are known to come next, so that none of them runs as Python if they are too many
+    for it altogether.
+    """
+    if _plain.get():
         return contextlib.nullcontext()
+    key = function, samples.dtype
     _samples[key] += len(samples)
-    return plain()
+    return plain() if _samples[key] + following <= SHORT else contextlib.nullcontext()
 
 
 class Jit(Generic[P, R]):

@@ -118,15 +118,17 @@ def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]
 
 
 def answers(
-    t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True
+    t: Tables | FixedTables | ChainTables, inverse: bool, call: ArrayLike, x: ArrayLike, compiled: bool = True,
+    following: int = 0,
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Answers and status of the bit-exact reference for calls `call` with arguments `x`, from the start memory on."""
+    """Answers and status of the bit-exact reference for calls `call` with arguments `x`, from the start memory on;
+    `following`: as in `jit.for_samples`."""
     code, state = operations(t, inverse), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
     with jit.plain():  # one pass over the memory is not worth compiling
         code.init(t, state)
-    with jit.for_samples(code.run, x) if compiled else jit.plain():
+    with jit.for_samples(code.run, x, following) if compiled else jit.plain():
         code.run(t, state, np.asarray(call, dtype=np.uint8), x, found, status)
     return found, status
 

@@ -37,12 +37,14 @@ class Mismatch:
 
 
 def expected_record(
-    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, calls: signals.Calls
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, calls: signals.Calls,
+    following: int = 0,
 ) -> Expected:
-    """A record of calls, with values of type `real`, and the output of the bit-exact reference."""
+    """A record of calls, with values of type `real`, and the output of the bit-exact reference; `following`: number of
+    calls in the records after it."""
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
-    answer, status = reference.answers(numbers, inverse, op, x)
+    answer, status = reference.answers(numbers, inverse, op, x, following=following)
     return Expected(name, op, x.astype(real), answer.astype(real), status)
 
 
@@ -50,8 +52,13 @@ def expected_records(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, length: int
 ) -> list[Expected]:
     """The verification records of an operator with the output of the bit-exact reference."""
-    suite = signals.suite(numbers, real, inverse, length)
-    return [expected_record(numbers, real, inverse, calls) for calls in suite]
+    suite = list(signals.suite(numbers, real, inverse, length))
+    following = sum(len(op) for _, op, _ in suite)
+    found = []
+    for calls in suite:
+        following -= len(calls[1])
+        found.append(expected_record(numbers, real, inverse, calls, following))
+    return found
 
 
 def _ulps(a: NDArray[np.number], b: NDArray[np.number]) -> float:
