@@ -21,7 +21,6 @@ import functools
 import hashlib
 import importlib.util
 import inspect
-import itertools
 import types
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeAlias, TypeVar, overload
@@ -127,15 +126,16 @@ class Jit(Generic[P, R]):
         if _plain.get():
             return self.interpreted(*given, **named)
         if _has_numba():
-            return self.entry(*map(self._passed, itertools.count(), given), **named)  # type: ignore[no-any-return]
+            passed = [self._passed(k, x) if isinstance(x, tuple) else x for k, x in enumerate(given)]
+            return self.entry(*passed, **named)  # type: ignore[no-any-return]
         _announce(interpreted)
         with plain():
             return self.interpreted(*given, **named)
 
-    def _passed(self, place: int, given: object) -> object:
+    def _passed(self, place: int, given: tuple[object, ...]) -> object:
         """An argument as compiled code takes it. A call for each sample passes the same tables and memory, whose words
         take ten times as long to write as a sample to compute; they are kept until others come."""
-        if not (isinstance(given, tuple) and hasattr(given, "_fields")):
+        if not hasattr(given, "_fields"):
             return given
         from hystgen.basics.packed import Packed
 
