@@ -11,7 +11,6 @@ import platform
 import shlex
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -88,9 +87,10 @@ def find(name: str) -> Compiler | None:
     an unclosed quote or an empty command.
     """
     if name.split() in (["zig"], ["zig", "cc"]):
-        if importlib.util.find_spec("ziglang"):
-            return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"))
-        path = shutil.which("zig")
+        # The wheel's program itself: to start it, `python -m ziglang` takes as long as a small file takes to compile
+        wheel = importlib.util.find_spec("ziglang")
+        folders = os.pathsep.join((wheel and wheel.submodule_search_locations) or ())
+        path = (shutil.which("zig", path=folders) if folders else None) or shutil.which("zig")
         return Compiler("zig", (path, "cc")) if path else None
     path = shutil.which(name)  # unsplit first: a path may have spaces
     if path:
