@@ -198,9 +198,9 @@ class Jit(Generic[P, R]):
         of all functions it calls."""
         from hystgen.basics import packed
 
-        text, functions = repr(OPTIONS) + inspect.getsource(packed), [self]
+        text, functions = repr(OPTIONS) + _source(packed), [self]
         for function in functions:
-            text += inspect.getsource(function.py_func) + repr(function.targetoptions)
+            text += _source(function.py_func.__code__) + repr(function.targetoptions)
             names = inspect.getclosurevars(function.py_func)
             for name, value in sorted({**names.globals, **names.nonlocals}.items()):
                 if isinstance(value, int | float | tuple):  # numba freezes them into the compiled code
@@ -208,6 +208,12 @@ class Jit(Generic[P, R]):
                 elif isinstance(value, Jit) and not any(value is each for each in functions):
                     functions.append(value)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@functools.cache
+def _source(of: types.ModuleType | types.CodeType) -> str:
+    """The source text, cached, since a function is in the marks of all that call it."""
+    return inspect.getsource(of)
 
 
 def _copy(function: Callable[..., object], names: dict[str, object]) -> types.FunctionType:
