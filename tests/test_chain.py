@@ -547,6 +547,38 @@ def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str
     assert stated / 10.0 <= worst <= 10.0 * stated
 
 
+def test_what_engines_share_of_the_search_for_an_error_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drives in double precision serve both engines, but no other model, arithmetic or settings."""
+    made: list[Run] = []
+    drives = Compensator.drives
+
+    def counted(self: Compensator, references: Run, ends: tuple[float, float]) -> Any:
+        made.append(references)
+        return drives(self, references, ends)
+
+    monkeypatch.setattr(Compensator, "drives", counted)
+    monkeypatch.setattr(measured, "SAMPLES", 100)
+    led = LED["led"]
+    assert led.count("time_constant: 0.01") == 1
+    other = led.replace("time_constant: 0.01", "time_constant: 0.011")
+    cases = [(led, "q31", "loop", 6), (led, "q31", "corners", 0), (other, "q31", "loop", 6), (led, "q15", "loop", 6)]
+
+    def found(text: str, arithmetic: str, engine: str) -> measured.Measured:
+        one = model("led", text)
+        numbers = tables.build(one.chain, arithmetic, T, engine=engine)
+        return measured.measured(numbers, one.chain, one.parameters.emit.compensation)
+
+    monkeypatch.setattr(measured, "_kept", {})
+    kept = []
+    for *case, times in cases:
+        made.clear()
+        kept.append(found(*case))
+        assert len(made) == times
+    for result, (*case, _) in zip(kept, cases, strict=True):
+        monkeypatch.setattr(measured, "_kept", {})
+        assert found(*case) == result
+
+
 @pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> None:
     """float32 stays within its bound of float64 tables to which its drives are committed; no more is promised here."""
