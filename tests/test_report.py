@@ -381,7 +381,7 @@ class TestCommand:
         page = Page((report / "report.html").read_text(encoding="utf-8"))
         assert "hystgen emit named.yaml -o firmware/\n" in page.sections["lead"]
         rows = table(page, "How good it is")
-        assert [row["part"] for row in rows] == ["candidate"] * 3 + ["fit", "held out"]
+        assert [row["part"] for row in rows] == ["candidate"] * 4 + ["fit", "held out"]
         assert "pi was chosen" in page.sections["How good it is"], "the plant has no front"
         beyond = 1.2 * wander(5) - 10.0
         number = int(np.count_nonzero((beyond < 0.0) | (beyond > 100.0)))
