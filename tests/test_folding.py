@@ -77,25 +77,94 @@ def statements(function: c_ast.FuncDef) -> list[c_ast.Node]:
     return [each for each in items if not (isinstance(each, c_ast.Cast) and isinstance(each.expr, c_ast.ID))]
 
 
-def types(function: c_ast.FuncDef) -> set[str]:
-    """Types named in the declaration of a function."""
-    return {word for each in below(function.decl) if isinstance(each, c_ast.IdentifierType) for word in each.names}
+Fields = dict[str, c_ast.Node]
+"""Types of the fields of a structure, or of the names in a function."""
 
 
-def reads(node: c_ast.Node) -> Iterator[str]:
-    """Names of the fields of `self` that a node reads."""
-    if isinstance(node, c_ast.Assignment) and node.op == "=":
-        field = node.lvalue
-        direct = isinstance(field, c_ast.StructRef) and isinstance(field.name, c_ast.ID) and field.name.name == "self"
-        own = {field.field.name} if direct else set()
-        yield from (each for each in reads(node.rvalue) if each not in own)
-        if not direct:
-            yield from reads(node.lvalue)
-        return
-    if isinstance(node, c_ast.StructRef) and isinstance(node.name, c_ast.ID) and node.name.name == "self":
-        yield node.field.name
-    for _, child in node.children():
-        yield from reads(child)
+class Structures:
+    """The structures of a module, and what its functions read of them."""
+
+    def __init__(self, module: c_ast.FileAST) -> None:
+        self.named = {each.name: each.type for each in module.ext if isinstance(each, c_ast.Typedef)}
+        self.globals: Fields = {each.name: each.type for each in module.ext if isinstance(each, c_ast.Decl)}
+        self.tables = [each.init for each in module.ext if isinstance(each, c_ast.Decl) and each.init]
+        self.functions = [each for each in module.ext if isinstance(each, c_ast.FuncDef)]
+        self.globals |= {each.decl.name: each.decl.type for each in self.functions}
+        self.locals: Fields = {}
+
+    def every(self) -> dict[str, Fields]:
+        """The fields of each structure, by the name of its type or of the only object of that type."""
+        alone = {name: kind for name, kind in self.globals.items() if isinstance(kind, c_ast.TypeDecl)}
+        own = {name: kind for name, kind in alone.items() if isinstance(kind.type, c_ast.Struct)}
+        return {name: found for name, kind in {**self.named, **own}.items() if (found := self._fields(kind))}
+
+    def read(self) -> set[tuple[str, str]]:
+        """The structures and fields whose values functions use, other than to store the field itself anew."""
+        found = set(self._reads(c_ast.ExprList(self.tables)))
+        for function in self.functions:
+            declared = [each for each in below(function) if isinstance(each, c_ast.Decl)]
+            self.locals = {each.name: each.type for each in declared}
+            found |= set(self._reads(function.body))
+        return found
+
+    def _plain(self, kind: c_ast.Node) -> c_ast.Node:
+        """A type behind the names that denote it."""
+        while isinstance(kind, c_ast.TypeDecl):
+            kind = kind.type
+            if isinstance(kind, c_ast.IdentifierType) and kind.names[0] in self.named:
+                kind = self.named[kind.names[0]]
+        return kind
+
+    def _fields(self, kind: c_ast.Node) -> Fields:
+        kind = self._plain(kind)
+        whole = isinstance(kind, c_ast.Struct) and kind.decls
+        return {each.name: each.type for each in kind.decls} if whole else {}
+
+    def _kind(self, node: c_ast.Node) -> c_ast.Node:
+        """The type of an expression that leads to a structure."""
+        if isinstance(node, c_ast.ID):
+            return self._plain(self.locals.get(node.name) or self.globals[node.name])
+        if isinstance(node, c_ast.StructRef):
+            owner, field = self._owner(node)
+            return self._plain(self.every()[owner][field])
+        if isinstance(node, c_ast.UnaryOp) and node.op == "&":
+            return c_ast.PtrDecl([], c_ast.TypeDecl(None, [], None, self._kind(node.expr)))
+        if isinstance(node, c_ast.BinaryOp):
+            return self._kind(node.left)
+        assert isinstance(node, c_ast.ArrayRef) or (isinstance(node, c_ast.UnaryOp) and node.op == "*")
+        return self._plain(self._kind(node.name if isinstance(node, c_ast.ArrayRef) else node.expr).type)
+
+    def _owner(self, node: c_ast.StructRef) -> tuple[str, str]:
+        """The structure and the field that an expression takes of it."""
+        kind = self._kind(node.name)
+        fields = self._fields(kind.type if node.type == "->" else kind)
+        (owner,) = [name for name, each in self.every().items() if each == fields]
+        return owner, node.field.name
+
+    def _reads(self, node: c_ast.Node) -> Iterator[tuple[str, str]]:
+        if isinstance(node, c_ast.Assignment):
+            own = {self._owner(node.lvalue)} if isinstance(node.lvalue, c_ast.StructRef) else set()
+            yield from (each for each in self._reads(node.rvalue) if each not in own)
+            yield from self._stored(node.lvalue)
+            return
+        if isinstance(node, c_ast.StructRef):
+            yield self._owner(node)
+            node = node.name  # the name of a field is no variable
+            yield from self._reads(node)
+            return
+        for _, child in node.children():
+            yield from self._reads(child)
+
+    def _stored(self, node: c_ast.Node) -> Iterator[tuple[str, str]]:
+        """What is read where an expression is stored to."""
+        if isinstance(node, c_ast.ArrayRef):
+            yield from self._reads(node.subscript)
+            array = isinstance(self._kind(node.name), c_ast.ArrayDecl)
+            yield from (self._stored if array else self._reads)(node.name)
+        elif isinstance(node, c_ast.StructRef):
+            yield from (self._reads if node.type == "->" else self._stored)(node.name)
+        elif not isinstance(node, c_ast.ID):
+            yield from self._reads(node)
 
 
 needs_gcc = pytest.mark.skipif(
@@ -140,12 +209,10 @@ def test_nothing_is_there_for_other_models(
                 field = each.subscript.field.name if isinstance(each.subscript, c_ast.StructRef) else ""
                 wrong = field == "rising" or getattr(each.subscript, "op", "") == "!"
                 assert not wrong, f"{function.decl.name} indexes by a bool"
-    for op in ("forward", "inverse") if operator == "both" else (operator,):
-        (state,) = [each for each in module.ext if isinstance(each, c_ast.Typedef) and each.name == f"{name}_{op}_t"]
-        fields = {each.name for each in state.type.type.decls}
-        mine = [each for each in functions if f"{name}_{op}_t" in types(each)]
-        read = {field for function in mine for field in reads(function.body)}
-        assert not fields - read, f"{op} never reads {sorted(fields - read)}"
+    structures = Structures(module)
+    every = {(owner, field) for owner, fields in structures.every().items() for field in fields}
+    unread = every - structures.read() - {(f"{name}_drive_t", "ascending")}  # see deviations.yaml
+    assert not unread, f"never read: {sorted(unread)}"
 
 
 @needs_gcc

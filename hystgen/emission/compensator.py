@@ -180,13 +180,16 @@ class Numbers:
 class Form(ABC):
     """How one kind of arithmetic writes the numbers of a model, and how it describes them if it has codes.
 
-    `apart`: first words of functions that would cost their callers stack if inlined; `suffix`: of the names of macros
-    in codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: descriptions of what
-    the setters take, in which MODEL stands for the model's name.
+    `apart`: first words of functions that would cost their callers stack if inlined; `limited`: fields of a curve that
+    only plays with a limit read; `solved`: fields of the loop engine's tables that only solutions read; `suffix`: of
+    the names of macros in codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`:
+    descriptions of what the setters take, in which MODEL stands for the model's name.
     """
 
     apart = "static"
     suffix = ""
+    limited: ClassVar[Sequence[str]] = ()
+    solved: ClassVar[Sequence[str]]
     held: ClassVar[str]
     warning = ""
     settings: ClassVar[Mapping[str, str]]
@@ -281,6 +284,16 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
 def truth(x: object) -> str:
     """A truth value in C."""
     return "true" if x else "false"
+
+
+def limits(t: AnyTables, options: Options) -> bool:
+    """Whether plays stop at a limit of their sum: only an inverse of plays alone solves for drives at one."""
+    return options.inverse and isinstance(t, Tables | FixedTables) and not t.has_front
+
+
+def solves(t: AnyTables, options: Options) -> bool:
+    """Whether an inverse solves for plays one by one, not by a search."""
+    return options.inverse and (isinstance(t, Tables | FixedTables) or not t.moving.used or t.moving.scanned)
 
 
 def pointers(
@@ -383,9 +396,16 @@ class EmittedModel:
 
     @property
     def kernel_facts(self) -> frozenset[str]:
-        """What the kernels know about the model: only an inverse of plays alone solves for drives at a limit."""
-        limited = self.options.inverse and not (self.variant.fronts or self.variant.chain)
-        return frozenset() if limited else frozenset({"HYSTGEN_HAS_NO_LIMIT"})
+        """What the kernels know about the model; nothing if models share them."""
+        known = limits(self.numbers.tables, self.options) or self.options.layout == "shared-runtime"
+        return frozenset() if known else frozenset({"HYSTGEN_HAS_NO_LIMIT"})
+
+    @property
+    def unread(self) -> Mapping[str, Sequence[str]]:
+        """Fields of the types of its tables that none of its functions reads, by type."""
+        t, options, form = self.numbers.tables, self.options, self.form
+        wanted = {"curve_t": (limits(t, options), form.limited), "tables_t": (solves(t, options), form.solved)}
+        return {f"hystgen_{own}": fields for own, (read, fields) in wanted.items() if not read}
 
     @property
     def units(self) -> UnitTexts:

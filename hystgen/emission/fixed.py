@@ -10,6 +10,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.layout import FixedTables
 from hystgen.emission.compensator import (
+    AnyTables,
     ConstantTable,
     EmittedStage,
     Errors,
@@ -23,6 +24,7 @@ from hystgen.emission.compensator import (
     macros,
     members,
     pointers,
+    solves,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
            ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))
-"""Fields of the loop engine's tables, their types, and whether both operators read them."""
+"""Fields of the loop engine's tables, their types, and whether they are read by more than solutions."""
 
 RELAXING = COLUMNS[2:]
 """The columns that the loop engine has for plays that relax."""
@@ -51,6 +53,7 @@ class FixedForm(Form):
     """Fixed point."""
 
     apart = "HYSTGEN_APART"
+    solved = (*(field for field, _, both in COLUMNS if not both), "least", "most")
     suffix = "_LSB"
     held = "never set: every code is valid"
     settings: ClassVar[Mapping[str, str]] = {
@@ -78,8 +81,8 @@ class FixedForm(Form):
         curves, counts = _curves(t, options, writer)
         rounding = form.inverse_rounding if options.inverse else None
         return Numbers(
-            t, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
-            (*_pointers(t, options, writer), *curves),
+            t, (*macros(t), *_macros(t), *counts), tuple(_plays(t, t, options, writer)),
+            (*_pointers(t, t, options, writer), *curves),
             _errors(options, (form.forward_error, form.inverse_error, rounding)),
             fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends.fine[0]) > 0,
             saturates=bool(ends.saturated[0] == ends.code_max[0]),
@@ -104,8 +107,8 @@ class FixedForm(Form):
         where = f" where {codes.condition}" if codes.condition else " on the same branch" * bool(plays.branches)
         return Numbers(
             tables, (*macros(plays), *_macros(plays), *counts, *constants),
-            tuple(_plays(plays, options, writer, chain=True)),
-            (*curves, *arrays, *_pointers(plays, options, writer), *_relaxing(tables, options, writer),
+            tuple(_plays(plays, tables, options, writer)),
+            (*curves, *arrays, *_pointers(plays, tables, options, writer), *_relaxing(tables, options, writer),
              *(each for stage in stages for each in stage.arrays)),
             _errors(options, (codes.forward_error, codes.inverse_error, codes.inverse_rounding), codes.condition),
             fronts=bool(plays.fronts),
@@ -251,20 +254,23 @@ def _macros(t: FixedTables) -> list[Macro]:
     ]
 
 
-def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[ConstantTable]:
-    """The tables of an engine and the start memory; `chain`: of a model with effects."""
+def _plays(t: FixedTables, model: AnyTables, options: Options, writer: Writer) -> list[ConstantTable]:
+    """The tables of an engine and the start memory; `model`: the tables of the model, which may have effects."""
     if options.engine == "corners":
-        return _corner_tables(t, options, writer, chain)
+        return _corner_tables(t, options, writer, model is not t)
     start = [writer.array("play_t", "model_start", list(t.start))] * (len(t.start) > 1)
-    columns = [(field, kind) for field, kind, both in COLUMNS if both or options.inverse]
+    columns = [(field, kind) for field, kind, both in COLUMNS if both or solves(model, options)]
     return [*(writer.array(kind, field, list(getattr(t, field))) for field, kind in columns), *start]
 
 
-def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[ConstantTable]:
-    """Pointers to the loop engine's tables, NULL for unread ones, and the ends of the plays' input."""
-    read = {field for field, _, both in COLUMNS if both or options.inverse}
-    places = [f"{writer.name}_{field}" if field in read else "NULL" for field, _, _ in COLUMNS]
-    return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
+def _pointers(t: FixedTables, model: AnyTables, options: Options, writer: Writer) -> list[ConstantTable]:
+    """Pointers to the loop engine's tables and the ends of the plays' input, if models share the type also unread ones,
+    then NULL."""
+    solved, shared = solves(model, options), options.layout == "shared-runtime"
+    columns = [(f"{writer.name}_{field}", both) for field, _, both in COLUMNS if both or solved or shared]
+    places = [array if both or solved else "NULL" for array, both in columns]
+    ends = _ends(t) if solved or shared else []
+    return [pointers(t, [*places, *ends], writer)] * (options.engine == "loop")
 
 
 def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[ConstantTable]:

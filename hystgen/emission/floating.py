@@ -12,6 +12,7 @@ from hystgen.compensator import float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.layout import Tables
 from hystgen.emission.compensator import (
+    AnyTables,
     ConstantTable,
     EmittedStage,
     Errors,
@@ -22,9 +23,11 @@ from hystgen.emission.compensator import (
     drives,
     entries,
     filled,
+    limits,
     macros,
     macros_of,
     pointers,
+    solves,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -41,7 +44,7 @@ if TYPE_CHECKING:
 
 COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
            ("lift", "lift", False))
-"""Fields of the loop engine's tables, the names of their arrays, and whether both operators read them."""
+"""Fields of the loop engine's tables, the names of their arrays, and whether they are read by more than solutions."""
 
 DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
              ("slope", 1, True), ("inverse_slope", 1, False))
@@ -50,6 +53,7 @@ DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True),
 class FloatingForm(Form):
     """Floating point."""
 
+    limited, solved = ("inside",), [field for field, _, both in COLUMNS if not both]
     held = "NaN or infinite input: the last answer was held"
     warning = (
         " Not for targets that flush denormal numbers to zero or do not round to nearest, nor for flags that "
@@ -72,7 +76,7 @@ class FloatingForm(Form):
         t = float_tables.build_float(model.cascade, options.arithmetic, options.engine, True, True)
         bounds = error_bounds(model.cascade, options.arithmetic, options.engine)
         errors = _errors(t, options, (bounds.forward, bounds.inverse, bounds.rounding))
-        return _numbers(t, errors, options, writer, chain=False)
+        return _numbers(t, t, errors, options, writer)
 
     def chained(
         self, model: Model, compiled: Compiled, effects: Tabled, stages: Sequence[EmittedStage], options: Options,
@@ -83,7 +87,7 @@ class FloatingForm(Form):
         tables, (arrays, constants) = compiled.tables, effects
         bounds = chain_bounds(compiled, options.arithmetic)
         errors = _errors(tables, options, (bounds.forward, bounds.inverse, bounds.rounding))
-        plays = _numbers(tables.plays, errors, options, writer, chain=True)
+        plays = _numbers(tables.plays, tables, errors, options, writer)
         return dataclasses.replace(
             plays, tables=tables, macros=(*plays.macros, *constants),
             beside=(*plays.beside, *arrays, *(each for stage in stages for each in stage.arrays)),
@@ -146,31 +150,34 @@ def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, floa
     return Errors(forward, inverse, rounding) if options.inverse else Errors(forward, 0.0, 0.0)
 
 
-def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain: bool) -> Numbers:
-    """The numbers of a model, or with `chain` those of the plays in a model with effects."""
+def _numbers(t: Tables, model: AnyTables, errors: Errors, options: Options, writer: Writer) -> Numbers:
+    """The numbers of a model, or those of the plays in a model with effects; `model`: its tables."""
     stages = [_stage(t, j, f"stage_{j + 1}", options, writer) for j in range(len(t.stage_kind))]
     beside = [array for stage in stages for array in stage.arrays]
     if options.engine == "corners":
-        plays = _corner_tables(t, options, writer, front=bool(stages) and not chain)
+        limited = limits(model, options) or options.layout == "shared-runtime"
+        plays = _corner_tables(t, options, writer, front=bool(stages) and model is t, limited=limited)
     else:
-        plays = _loop_tables(t, options, writer)
-        read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or options.inverse}
-        places = [read.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
-        beside = [pointers(t, places, writer), *beside]
+        solved = solves(model, options)
+        plays = _loop_tables(t, solved, writer)
+        read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or solved}
+        places = [read[field] for field in ("threshold", "weight", "lift", "inverse_slope") if field in read]
+        unread = ["NULL"] * (len(COLUMNS) - len(read)) * (options.layout == "shared-runtime")
+        beside = [pointers(t, [*places, *unread], writer), *beside]
     return Numbers(
         t, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
         envelopes=any(stage.kind == "envelope" for stage in stages), stages=tuple(stages),
     )
 
 
-def _loop_tables(t: Tables, options: Options, writer: Writer) -> list[ConstantTable]:
+def _loop_tables(t: Tables, solved: bool, writer: Writer) -> list[ConstantTable]:
     """The loop engine's tables: arrays in one structure, and the start memory."""
-    columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or options.inverse]
+    columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or solved]
     start = [writer.array("real_t", "model_start", list(t.start))] * (len(t.start) > 1)
     return [writer.columns("real_t", "play", columns), *start]
 
 
-def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[ConstantTable]:
+def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool, limited: bool) -> list[ConstantTable]:
     """The corner engine's tables, one operator after the other."""
     found = []
     for operator, curve, starts in (
@@ -178,16 +185,18 @@ def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> 
         ("inverse", t.inverse, (t.inverse_first, t.inverse_zero)),
     ):
         if operator in options.operators:
-            found += _curve_tables(curve, starts, operator, writer)
+            found += _curve_tables(curve, starts, operator, writer, limited)
             found += [drives(t, (t.applied, t.begin), operator, writer)] * front
     return found
 
 
-def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer) -> list[ConstantTable]:
+def _curve_tables(
+    curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer, limited: bool
+) -> list[ConstantTable]:
     """Segments, curve and start memories of one operator."""
     rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
     segments = filled(f"{{{entries(row)}}}" for row in rows).splitlines()
-    pairs = [f"{{{entries(pair[:2])}}}" for pair in (curve.limit, curve.inside, curve.range)]
+    pairs = [f"{{{entries(pair[:2])}}}" for pair in (curve.limit, *[curve.inside] * limited, curve.range)]
     found = [
         writer.lines("segment_t", f"{operator}_segment", segments, len(curve.way)),
         writer.entries("curve_t", f"{operator}_curve", [f"{writer.name}_{operator}_segment", *pairs]),

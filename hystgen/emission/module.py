@@ -110,26 +110,39 @@ def composed(one: EmittedModel) -> Code:
     pieces = runtime.operator_pieces(one.variant, operators, front(one), one.calls, own_functions)
     called = sorted(runtime.used(pieces))
     shared = one.options.layout == "shared-runtime"
-    kernels = runtime.kernel_pieces(family, frozenset() if shared else one.kernel_facts)
-    kernels = runtime.needed([*runtime.table_pieces(family), *kernels], called)
+    memory, of_tables = runtime.memory_pieces(family), runtime.table_pieces(family)
+    kernels = runtime.kernel_pieces(family, one.kernel_facts)
+    if not shared:
+        kernels = runtime.needed(kernels, called)
+        of_tables = [
+            runtime.with_fields(each, {own.name for own in each.members} - {*one.unread.get(each.name, ())})
+            for each in of_tables
+        ]
+    named = runtime.named_fields([*pieces, *kernels])
+    pieces = runtime.without_unread(pieces, named)
+    if not shared:
+        kernels = runtime.without_unread(kernels, named)
+        memory = runtime.without_unread(memory, named, runtime.needed(memory, runtime.used(of_tables)))
+    kernels = runtime.needed([*of_tables, *kernels], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
     numbers = one.numbers
-    named = _named(text, [*numbers.plays, *numbers.beside])
-    plays, beside = ([each for each in every if each.name in named] for every in (numbers.plays, numbers.beside))
+    tabled = _named(text, [*numbers.plays, *numbers.beside])
+    plays, beside = ([each for each in every if each.name in tabled] for every in (numbers.plays, numbers.beside))
     contents = [each for table in (*plays, *beside) for each in table.contents]
     tables: list[runtime.Piece] = []
     if one.glue:
         glue = one.glue.named({op: runtime.fields(pieces, op) for op in operators})
         types = [*blocks, *glue.states.values()]
-        states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         kinds = [f"hystgen_{kind}" for kind, _ in contents]
+        types = runtime.without_unread(types, named, runtime.needed(types, kinds))
+        states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         tables = [piece for piece in runtime.needed(types, [*called, *kinds]) if piece not in states]
     else:
         states = runtime.state_pieces(one.variant, family, operators, pieces)
     shown = runtime.render_operators(states, names.name, one.corners, names.rt, family)
     if one.corners and not shared:
-        shown = f"{runtime.all_types(family.states, names.rt, family)}\n{shown}"
+        shown = f"{runtime.all_types(memory, names.rt, family)}\n{shown}"
     return Code(
         types=runtime.render_operators(tables, names.name, 0, names.rt, family),
         states=shown,
@@ -143,7 +156,7 @@ def composed(one: EmittedModel) -> Code:
         plays=tuple(plays),
         beside=tuple(beside),
         data=Data(
-            family, [*runtime.memory_pieces(family), *runtime.table_pieces(family), *tables, *states], plays,
+            family, [*memory, *of_tables, *tables, *states], plays,
             [*contents, *(each for piece in (*kernels, *pieces, *tables) for each in piece.contents)],
         ),
     )
@@ -281,7 +294,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         f"{file}.h": template(
             "runtime.h.j2", family=family, rt=prefix, RT=prefix.upper(),
             banner=top(f"{file}.h", f"kernels shared by all {arithmetic} models"), build=whole(*family.build),
-            types=runtime.all_types((*family.states, *family.tables), prefix, family),
+            types=runtime.all_types([*runtime.memory_pieces(family), *runtime.table_pieces(family)], prefix, family),
             prototypes=runtime.prototypes(prefix, family),
         ),
         f"{file}.c": template(

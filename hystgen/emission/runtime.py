@@ -624,11 +624,38 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
     for op in operators:
         named = fields(functions, op)
         for piece in needed(_pieces([CORNER_STATE], family.facts | variant.facts), [f"hystgen_{op}_t"]):
-            lines = piece.text.split("\n")
-            member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
-            kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
-            made.append(piece_of("\n".join(kept)))
+            made.append(with_fields(piece, named))
     return made
+
+
+_FIELD = re.compile(r"^    [\w *]+?(\w+)(?:\[.*\])?;")
+_STORE = re.compile(r"^ *\w+(?:(?:->|\.)\w+)*(?:->|\.)(\w+) = [\w.]+;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+
+
+def with_fields(piece: Piece, names: Collection[str]) -> Piece:
+    """A structure with only the fields of these names."""
+    lines = piece.text.splitlines(keepends=True)
+    text = "".join(line for line in lines if not (found := _FIELD.match(line)) or found[1] in names)
+    return replace(piece_of(text), declared=tuple(each for each in piece.declared if each.name in names))
+
+
+def named_fields(functions: Iterable[Piece]) -> frozenset[str]:
+    """The names of all fields of which functions do more than set them to a plain value."""
+    texts = (_STORE.sub("", each.code) for each in functions)
+    return frozenset(field for text in texts for field in re.findall(r"(?:->|\.)(\w+)", text))
+
+
+def without_unread(pieces: Iterable[Piece], named: Collection[str], whole: Collection[Piece] = ()) -> list[Piece]:
+    """Functions and types without fields that are not `named`; types in `whole`, those of constants, keep theirs."""
+
+    def stored(found: re.Match[str]) -> str:
+        return found[0] if found[1] in named else ""
+
+    return [
+        piece if piece in whole else with_fields(piece, named) if piece.members
+        else piece_of(text) if (text := _STORE.sub(stored, piece.text)) != piece.text else piece
+        for piece in pieces
+    ]
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
@@ -744,9 +771,9 @@ def _named(
     return _NAME.sub(renamed, text)
 
 
-def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
-    """Every type definition in these headers of the run time."""
-    return _named(_joined(_pieces(files, family.facts)), prefix, family, prefix)
+def all_types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
+    """These type definitions of the run time."""
+    return _named(_joined(pieces), prefix, family, prefix)
 
 
 def prototypes(prefix: str, family: Family) -> str:

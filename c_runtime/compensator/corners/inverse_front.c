@@ -59,10 +59,10 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
         self->reference = u;
         const hystgen_real_t w = hystgen_plays_step(&hystgen_operator_curve, &self->plays,
                                                     self->corner, level - HYSTGEN_OFFSET);
-        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
+        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->unreached);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
+        self->bits |= self->unreached ? HYSTGEN_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* the plays do not reach w with this drive */
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;

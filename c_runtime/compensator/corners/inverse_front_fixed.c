@@ -34,10 +34,10 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
         const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output,
                                         self->next, &self->kink);
         const hystgen_reach_t v =
-            hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &self->limited);
+            hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &self->unreached);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->last = level;
-        if (self->limited) {
+        if (self->unreached) {
             self->bits |= HYSTGEN_STATUS_DOMAIN;
         }
         if (inside != v) {

@@ -47,8 +47,8 @@ typedef struct {
     bool stepped;   /* a step has returned a drive */
     bool committed; /* a drive was committed since */
 #endif
-    bool repeated; /* the last returned drive is still valid for `reference` */
-    bool limited;  /* no drive reaches `reference`; kept here rather than on the stack */
+    bool repeated;  /* the last returned drive is still valid for `reference` */
+    bool unreached; /* no drive reaches `reference`; kept here rather than on the stack */
 #ifdef HYSTGEN_FIXED
     uint_least8_t bits; /* status of the last returned drive */
 #else

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 f7b1f00f4b3a81822172945e26a9d4725e3d87a893abe7ac7aeeee3ae9b484ee, without this line
+ * Text: sha256 e90ca7cb450ab945b63421df0cebffe6d7aa7ef6b10508ae5e13c2c9a16e4430, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -505,9 +505,9 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
         self->bits = level != u ? CURVED_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = curved_solve(&curved_model_curve, &self->here, self->corner, output,
             self->next, &self->kink);
-        const curved_reach_t v = curved_front_inverse((curved_reach_t)w, &self->limited);
+        const curved_reach_t v = curved_front_inverse((curved_reach_t)w, &self->unreached);
         const curved_real_t inside = curved_clamp_drive(v);
-        if (self->limited) {
+        if (self->unreached) {
             self->bits |= CURVED_STATUS_DOMAIN;
         }
         if (inside != v) {

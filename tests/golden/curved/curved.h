@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 b24519c0a6627f36e8e24b737511bb97c9c88e2332eae51a3d930f36f9946601, without this line
+ * Text: sha256 eba72e5855a7ee7cbfdf4560e3c99d6bcf2edc5f9529dc560056b5952a041bfc, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -116,7 +116,7 @@ typedef struct {
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
     bool repeated;           /* the last returned drive is still valid for `reference` */
-    bool limited;            /* no drive reaches `reference`; kept here rather than on the stack */
+    bool unreached;          /* no drive reaches `reference`; kept here rather than on the stack */
     uint_least8_t bits;      /* status of the last returned drive */
     unsigned int status;
     curved_place_t undo; /* position of the plays before the last step */

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 7862811e6b28d2d7f96bdef6e35176a2365b64e456664d796ca0761a6d32cff7, without this line
+ * Text: sha256 2330abfacbd25cb6fb12f06b3a99cb539b17d93aea5bcc908e5c5ac8d733bca4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -14,13 +14,13 @@
  * Cost (32-bit target):
  *     code at -O2       about 4972 bytes on a Cortex-M0+, 4264 on a Cortex-M4F, as measured for a
  *         similar model with 10 plays
- *     constant tables   832 bytes
- *     inverse instance  220 bytes of RAM
+ *     constant tables   824 bytes
+ *     inverse instance  216 bytes of RAM
  *     inverse step, worst case: 34 multiplications, 60 comparisons (48 + 4 b, b = 3, the bit length
  *         of n), 1 tanh, 2 atanh
  *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
  *         and 120 on a Cortex-M4F, as measured for similar models
- * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in total, 31 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 1007 bytes of RAM in total, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -133,7 +133,6 @@ typedef struct {
     two_branches_real_t start;
     two_branches_real_t gain;
     two_branches_real_t sign; /* 1 for rising, -1 for falling */
-    bool limited; /* the output is a limit, and the input may lie beyond the one for this output */
 } two_branches_plays_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
@@ -151,7 +150,7 @@ typedef struct {
     bool stepped;      /* a step has returned a drive */
     bool committed;    /* a drive was committed since */
     bool repeated;     /* the last returned drive is still valid for `reference` */
-    bool limited;      /* no drive reaches `reference`; kept here rather than on the stack */
+    bool unreached;    /* no drive reaches `reference`; kept here rather than on the stack */
     unsigned int bits; /* status of the last returned drive */
     unsigned int status;
     two_branches_corner_t corner[7];
@@ -298,8 +297,7 @@ typedef struct {
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
-    two_branches_real_t inside[2]; /* outputs up to these stay within the limit despite rounding */
-    two_branches_real_t range[2];  /* of the input */
+    two_branches_real_t range[2];          /* of the input */
 } two_branches_curve_t;
 
 /* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
@@ -533,7 +531,6 @@ TWO_BRANCHES_SWIFT void two_branches_reverse(const two_branches_curve_t *t, two_
         m->here.k = 0;
     }
     m->here.rising = !m->here.rising;
-    m->limited = false;
     m->sign = -m->sign;
 }
 
@@ -630,7 +627,6 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
     }
     m->here.k = kept + 1u < m->here.depth ? corner[kept + 1u].top : m->here.k;
     m->here.depth = (uint_least16_t)(kept + 1u);
-    m->limited = false;
     (void)two_branches_move_or_stop(t, m, &corner[kept], FLT_MAX, two_branches_along(m, output),
         true);
 }
@@ -739,8 +735,7 @@ static const two_branches_segment_t two_branches_inverse_segment[8] = {
     {9.82799f, 5.399996f, 0.3949447f, 2.532f}, {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
 };
 static const two_branches_curve_t two_branches_inverse_curve = {
-    two_branches_inverse_segment, {3.4028235e+38f, 3.4028235e+38f},
-    {3.4028235e+38f, 3.4028235e+38f}, {3.4028235e+38f, 3.4028235e+38f}
+    two_branches_inverse_segment, {3.4028235e+38f, 3.4028235e+38f}, {3.4028235e+38f, 3.4028235e+38f}
 };
 static const two_branches_real_t two_branches_inverse_init_center[1][2] = {{0.0f, 0.0f}};
 static const two_branches_start_t two_branches_inverse_start[2] = {
@@ -890,10 +885,10 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         self->reference = u;
         const two_branches_real_t w = two_branches_plays_step(&two_branches_inverse_curve,
             &self->plays, self->corner, level - TWO_BRANCHES_OFFSET);
-        const two_branches_real_t v = two_branches_inverse_choose(self, level, w, &self->limited);
+        const two_branches_real_t v = two_branches_inverse_choose(self, level, w, &self->unreached);
         const two_branches_real_t inside = two_branches_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits |= self->limited ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
+        self->bits |= self->unreached ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* the plays do not reach w with this drive */
             self->bits |= clamped ? TWO_BRANCHES_STATUS_OUTPUT_CLAMPED : 0u;
