@@ -181,7 +181,7 @@ STATES = [
     (r"(        sum \+= [^;]* NAME_bent\(i, NAME_resting\([^;]*;\n)", r"\1        WITHIN(sum, PLAYS);\n"),
     (r"(    const uint16_t curve = NAME_bump_of\[i\];\n)", r"\1    /*@ split curve; */\n"),  # curve by curve
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
-    (r"(    search->before = search->input;\n)", r"    WITHIN(next, INPUT);\n\1"),
+    (r"(    search->prior = search->input;\n)", r"    WITHIN(next, INPUT);\n\1"),
     (r"    return \(NAME_play_t\)\((w > play \? [^;]*|(?:play\[i\]|x) \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # not facts: where Eva should stop widening, and what it should analyse case by case

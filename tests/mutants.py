@@ -395,7 +395,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("thresholds grow with rising drives alone", "effects/rate_dependence/moved.c",
      "w > x ? w - x : x - w;", "w > x ? w - x : 0;", "dilated", "float32"),
     ("a bent play that leaves still counts among those that stay, fixed", "compensator/chain/moving_plays.c",
-     "self->staying -= hystgen_model_tables", "self->staying -= 0 * hystgen_model_tables", "bumpy", "q31"),
+     "staying -=\n            (hystgen_sum_t)", "staying -=\n            0 * (hystgen_sum_t)", "bumpy", "q31"),
     ("plays never move", "compensator/chain/moving_plays.c",
      "play[i] = hystgen_reached(i, play, x, w)", "play[i] = play[i] + 0 * w", "dilated", "float32"),
     ("plays stand still while their input does", "effects/rate_dependence/moved.c", "            play[i] = rest;\n",

@@ -50,6 +50,8 @@ KINDS = (
     ("warm", "both", "q31", "loop"), ("heated", "inverse", "q15", "loop"), ("drifting", "inverse", "float32", "loop"),
     ("lagging", "both", "float32", "corners"), ("dashpot", "both", "float32", "loop"),
     ("everything", "both", "q31", "loop"), ("quick", "inverse", "q31", "loop"), ("bumpy", "inverse", "q31", "loop"),
+    ("viscous", "both", "q31", "loop"), ("dashpot", "both", "q31", "loop"), ("wider", "both", "float32", "loop"),
+    ("forgetful", "both", "q31", "loop"),
 )  # fmt: skip
 
 
@@ -75,6 +77,11 @@ def statements(function: c_ast.FuncDef) -> list[c_ast.Node]:
     """Statements of a function, without those that only mark a parameter as used."""
     items = function.body.block_items or []
     return [each for each in items if not (isinstance(each, c_ast.Cast) and isinstance(each.expr, c_ast.ID))]
+
+
+def types(node: c_ast.Node) -> set[str]:
+    """Types named in a declaration."""
+    return {word for each in below(node) if isinstance(each, c_ast.IdentifierType) for word in each.names}
 
 
 Fields = dict[str, c_ast.Node]
@@ -200,6 +207,10 @@ def test_nothing_is_there_for_other_models(
         for each in below(function.body):
             if isinstance(each, c_ast.If):
                 assert not isinstance(each.cond, c_ast.Constant | c_ast.ID) or each.cond.name not in ("true", "false")
+                assert each.iftrue.block_items, f"{function.decl.name} asks for nothing"
+            if isinstance(each, c_ast.Cast) and "void" in types(each.to_type):
+                wanted = c_ast.ID | c_ast.FuncCall | c_ast.Constant  # (void)0 stands for a macro
+                assert isinstance(each.expr, wanted), f"{function.decl.name} has an idle statement"
     for function in functions:
         for each in below(function.body):
             if isinstance(each, c_ast.TernaryOp):

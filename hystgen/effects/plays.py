@@ -69,7 +69,7 @@ class FixedSearchState(Struct):
     last: Int64 = note("and at the one before")
     rate: UInt32 = note("change in the input per unit change in the sum; kept for the next search")
     input: Int32 = note("the one tried last,")
-    before: Int32 = note("and the one before")
+    prior: Int32 = note("and the one before")
     low: Int32
     top: Int32
     tries: UInt8 = note("by secants")

@@ -508,6 +508,8 @@ def _without_branches(body: str) -> str:
             return _without_branches(before + re.sub("^    ", "", inside, flags=re.MULTILINE) + behind)
         if alone and not inside.strip() and re.fullmatch(_LOOKS, condition):
             return _without_branches(before + (f"{indent}}}\n" if chained else "") + behind)
+        if alone and not inside.strip() and not chained and re.match(r"\w+\(", condition) and _single(condition):
+            return _without_branches(f"{before}{indent}(void){condition};\n{behind}")
     return _choices(body)
 
 

@@ -629,7 +629,10 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
 
 
 _FIELD = re.compile(r"^    [\w *]+?(\w+)(?:\[.*\])?;")
-_STORE = re.compile(r"^ *\w+(?:(?:->|\.)\w+)*(?:->|\.)(\w+) = [\w.]+;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+_STORE = re.compile(
+    r"^ *(?P<of>\w+(?:(?:->|\.)\w+)*)(?:->|\.)(?P<field>\w+) = (?P<value>[\w.>[\]-]+);(?: */\*[^\n]*?\*/)?\n",
+    re.MULTILINE,
+)
 
 
 def with_fields(piece: Piece, names: Collection[str]) -> Piece:
@@ -641,7 +644,7 @@ def with_fields(piece: Piece, names: Collection[str]) -> Piece:
 
 def named_fields(functions: Iterable[Piece]) -> frozenset[str]:
     """The names of all fields of which functions do more than set them to a plain value."""
-    texts = (_STORE.sub("", each.code) for each in functions)
+    texts = (_STORE.sub(r"\g<of> \g<value>\n", each.code) for each in functions)
     return frozenset(field for text in texts for field in re.findall(r"(?:->|\.)(\w+)", text))
 
 
@@ -649,7 +652,7 @@ def without_unread(pieces: Iterable[Piece], named: Collection[str], whole: Colle
     """Functions and types without fields that are not `named`; types in `whole`, those of constants, keep theirs."""
 
     def stored(found: re.Match[str]) -> str:
-        return found[0] if found[1] in named else ""
+        return found[0] if found["field"] in named else ""
 
     return [
         piece if piece in whole else with_fields(piece, named) if piece.members

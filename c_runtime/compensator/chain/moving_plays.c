@@ -17,7 +17,7 @@ static inline hystgen_sum_t hystgen_operator_way(const hystgen_operator_t *self,
 
 #ifdef HYSTGEN_FIXED
 /* Sum of the elements after their input has moved on to w, in the direction in which they move, or
-   at rest: along the slope at a place near w (`hystgen_operator_approach`). */
+   at rest: along the slope at a place near w (`near`). */
 static inline hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *self,
                                                     hystgen_play_t w) {
     return self->moving ? self->joined + self->slope * ((hystgen_sum_t)w - self->near) : 0;
@@ -165,7 +165,8 @@ HYSTGEN_APART void hystgen_operator_release(hystgen_operator_t *self, hystgen_pl
         if (hystgen_resting(i, self->play, w) == self->play[i]) {
             break;
         }
-        self->staying -= hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
+        self->staying -=
+            (hystgen_sum_t)hystgen_model_tables.weight[i] * hystgen_bent(i, self->play[i]);
         self->released = i;
     }
 }
@@ -177,7 +178,8 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_sum(const hystgen_operator_t *self,
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= self->released; ++i) {
-        sum += hystgen_model_tables.weight[i] * hystgen_bent(i, hystgen_resting(i, self->play, w));
+        sum += (hystgen_sum_t)hystgen_model_tables.weight[i] *
+               hystgen_bent(i, hystgen_resting(i, self->play, w));
     }
 #ifdef HYSTGEN_HAS_ELEMENTS
     sum += hystgen_operator_joined(self, w);
@@ -333,12 +335,12 @@ static void hystgen_moved_on(hystgen_play_t *play, hystgen_sum_t *bent, hystgen_
     HYSTGEN_ROLLED
 #ifdef HYSTGEN_HAS_ORDERED_PLAYS
     for (i = 1; i <= HYSTGEN_N_PLAYS && hystgen_move(i, play, play[0], w); ++i) {
-        (void)hystgen_bent_anew(i, play[i], bent);
+        hystgen_bent_anew(i, play[i], bent);
     }
 #else
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (hystgen_move(i, play, play[0], w)) {
-            (void)hystgen_bent_anew(i, play[i], bent);
+            hystgen_bent_anew(i, play[i], bent);
         }
     }
 #endif
@@ -357,7 +359,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_s
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         if (hystgen_move(i, play, play[0], w)) {
-            (void)hystgen_bent_anew(i, play[i], bent);
+            hystgen_bent_anew(i, play[i], bent);
         }
         sum = sum + hystgen_model_tables.weight[i] * hystgen_staying(i, play, bent);
     }
@@ -373,7 +375,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
-        (void)hystgen_bent_anew(i, play[i], bent);
+        hystgen_bent_anew(i, play[i], bent);
     }
     play[0] = w;
     return hystgen_with_staying(1, play, bent, (hystgen_sum_t)hystgen_model_tables.weight[0] * w);

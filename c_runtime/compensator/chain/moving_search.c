@@ -68,7 +68,7 @@ HYSTGEN_APART void hystgen_inverse_rate(hystgen_search_t *search, hystgen_sum_t 
 #ifndef HYSTGEN_HAS_SMOOTH_SUM
 /* Updates the rate to that of the secant through the last two inputs, once there are two. */
 static void hystgen_inverse_turn(hystgen_search_t *search) {
-    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->before);
+    const hystgen_sum_t way = hystgen_size((hystgen_sum_t)search->input - search->prior);
     if (way > 0) {
         hystgen_inverse_rate(search, way, hystgen_size(search->found - search->last));
     }
@@ -149,7 +149,7 @@ HYSTGEN_APART void hystgen_inverse_advance(hystgen_search_t *search) {
     if (next <= search->low || next > search->top) {
         next = search->low + ((hystgen_sum_t)search->top - search->low + 1) / 2;
     }
-    search->before = search->input;
+    search->prior = search->input;
     search->last = search->found;
     search->input = (hystgen_play_t)next;
 }
@@ -164,7 +164,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
     self->search.total = hystgen_asked(h);
     self->search.tries = 0;
     self->search.input = self->play[0];
-    self->search.before = self->play[0];
+    self->search.prior = self->play[0];
 #ifndef HYSTGEN_HAS_PLAIN_PLAYS
 #ifdef HYSTGEN_HAS_ELEMENTS
     (void)hystgen_inverse_turns(self, h);

@@ -97,7 +97,7 @@ typedef struct {
     int64_t last;     /* and at the one before */
     uint32_t rate;    /* change in the input per unit change in the sum; kept for the next search */
     int32_t input;    /* the one tried last, */
-    int32_t before;   /* and the one before */
+    int32_t prior;    /* and the one before */
     int32_t low;
     int32_t top;
     uint8_t tries; /* by secants */

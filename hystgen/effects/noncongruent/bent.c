@@ -6,7 +6,7 @@
 
 #ifndef HYSTGEN_HAS_BENT_PLAYS
 /* Contribution of play i at z: z itself. */
-static inline hystgen_sum_t hystgen_bent(unsigned int i, hystgen_play_t z) {
+static inline hystgen_play_t hystgen_bent(unsigned int i, hystgen_play_t z) {
     (void)i;
     return z;
 }
@@ -86,16 +86,14 @@ HYSTGEN_APART hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
 }
 #endif
 
-/* Contribution of play i at z. Keeps it in floating point, if it is not z itself. */
-static inline hystgen_sum_t hystgen_bent_anew(unsigned int i, hystgen_play_t z,
-                                              hystgen_sum_t *bent) {
+/* Keeps the contribution of play i at z in floating point, if it is not z itself. */
+static inline void hystgen_bent_anew(unsigned int i, hystgen_play_t z, hystgen_sum_t *bent) {
 #if defined(HYSTGEN_HAS_BENT_PLAYS) && !defined(HYSTGEN_FIXED)
     bent[i - 1u] = hystgen_bent(i, z);
-    return bent[i - 1u];
 #else
     (void)i;
+    (void)z;
     (void)bent;
-    return z;
 #endif
 }
 

@@ -49,7 +49,7 @@ HYSTGEN_APART void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
             (hystgen_play_t)(play[i] + hystgen_share_of(on, &hystgen_kept[i]));
         if (rest < play[i] || rest > play[i]) {
             play[i] = rest;
-            (void)hystgen_bent_anew(i, rest, bent);
+            hystgen_bent_anew(i, rest, bent);
         }
     }
 }
