@@ -405,6 +405,16 @@ class Model:
             self.cascade.inverse()
         return InverseModel(self)
 
+    def outside(self, reference: Run) -> NDArray[np.bool_]:
+        """Which references (N,) lie outside the output range, all effects at rest, to which the C limits them."""
+        from hystgen.compensator.chain import layout
+
+        record = float(np.median(reference.steps)) if len(reference.steps) else 1.0
+        seconds = self.parameters.sample_time or record
+        low, high = layout.output_range(self.cascade, self.compensator.parts, seconds)
+        rounded = remarks.ROUNDED * (high - low)
+        return (reference.v < low - rounded) | (reference.v > high + rounded)
+
     @cached_property
     def compensator(self) -> Compensator:
         """The inverse in double precision of a model with effects; raises the same errors as `inverse`."""
@@ -430,7 +440,8 @@ class InverseModel:
 
         As in the C, the drive stays in `input_range` and the memory follows the limited drive, so the inverse is exact
         again at the next reachable reference; `clamp=False` gives the unlimited inverse, in double precision. A
-        non-finite sample holds the drive. Warns (`SampleWarning`) with the numbers of limited and of held samples.
+        non-finite sample holds the drive. Warns (`SampleWarning`) with the numbers of limited and of held samples, and
+        of references outside the output range, which the C limits even while the drive is far from its end.
 
         With effects the whole reference is known in advance: delays and modes look ahead in it, and the model is at
         rest at the first sample. The settings of `emit.compensation` in the parameter file apply, counted in samples of
@@ -456,9 +467,11 @@ class InverseModel:
         low, high = model.cascade.input_range
         references, held = _held("u", u, None)
         ends = (low, high) if clamp else (-math.inf, math.inf)
-        v, beyond = model.compensator.answers(model.run(references, t, extra), ends, held=held)
-        limited = int(np.count_nonzero(beyond > remarks.ROUNDED * (high - low)))
-        return v, remarks.inverse(len(v), 0, limited, int(np.count_nonzero(held)))
+        run = model.run(references, t, extra)
+        v, beyond = model.compensator.answers(run, ends, held=held)
+        outside = model.outside(run) & ~held & clamp
+        limited = beyond > remarks.ROUNDED * (high - low)
+        return v, remarks.compensated(outside, limited, int(np.count_nonzero(held)))
 
     def inverse(self) -> Model:
         """The model that this inverse compensates."""

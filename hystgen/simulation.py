@@ -118,9 +118,10 @@ def _compensated(
     for part in session.parts:
         asked[part] = True
     drives, beyond = model.compensator.answers(session.run, ends, asked)
+    outside = model.outside(session.run) & asked
     limited = beyond > remarks.ROUNDED * (high - low)
     return [
-        (drives[part], _of(record.name, remarks.inverse(len(drives[part]), 0, int(np.count_nonzero(limited[part])))))
+        (drives[part], _of(record.name, remarks.compensated(outside[part], limited[part])))
         for record, part in zip(records, session.parts, strict=True)
     ]
 

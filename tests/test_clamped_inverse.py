@@ -13,8 +13,10 @@ from scipy import signal
 
 import hystgen
 from hystgen.cascade import PI, Cascade
+from hystgen.compensator.chain.run import with_status
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 
 Array = NDArray[np.float64]
 R, P = np.array([0.0, 5.0, 20.0]), np.array([120.0, 20.0, 30.0])
@@ -74,7 +76,7 @@ def told(run: Callable[[], Array]) -> tuple[Array, dict[str, int]]:
         match = re.match(r"(\d+) of (\d+) (references|drives|samples) .*?(extrapolated|limited|held)", text)
         assert match is not None, text
         assert int(match[2]) == len(found)
-        counts[f"{match[3]} {match[4]}"] = int(match[1])
+        counts[f"{match[3]} {match[4]}"] = counts.get(f"{match[3]} {match[4]}", 0) + int(match[1])
     return found, counts
 
 
@@ -167,3 +169,21 @@ def test_a_pure_cascade_keeps_its_range_and_a_play_sum_has_none() -> None:
     assert counts == {}
     assert np.max(np.abs(plays(free) - u)) < 1e-9 * float(np.max(u))
     assert told(lambda: pi.simulate(free))[1] == {}
+
+
+@pytest.mark.parametrize(
+    "effect",
+    ["name: slew_limit, rate: 5000", f"name: creep, time_constants: [{TAU}], weights: [{SHARE}]",
+     "name: rate_dependence, shape: relaxation, time_constant: 0.005"],
+)  # fmt: skip
+def test_a_reference_out_of_range_is_told_of_at_once_as_in_the_c(effect: str) -> None:
+    """Even while a slew limit keeps the drive far from its end; those told of are those that the C marks."""
+    one = model(f"{PLAIN}  effects: [{{{effect}}}]\n")
+    u = np.concatenate([np.zeros(3), np.full(4, 1e5), np.full(200, OFFSET + 2000.0), np.full(3, -1e5)])
+    v, counts = told(lambda: one.inverse().simulate(u))
+    compiled = one.compiled("float64", one.engine(arithmetic="float64"))
+    _, status = with_status(compiled, one.run(u), True)
+    assert counts["references limited"] == np.count_nonzero(status & slots.INPUT_CLAMPED)
+    assert counts["references limited"] >= 7
+    if "slew" in effect:
+        assert np.max(v[:7]) < 0.5 * HIGH, "none of these drives is at its end"

@@ -127,11 +127,11 @@ class TestLimited:
 
     def test_beyond_the_range(self) -> None:
         u = np.concatenate([np.linspace(0.0, 12.0, 50), np.full(3, 500.0), np.full(40, 12.0)])
-        assert self.said(TEXT, u) == ["u.csv: 3 of 93 drives were limited to input_range"]
-        assert self.said(self.STATIC, u)[0] == "u.csv: 3 of 93 references lie outside the output range and were limited"
+        for text in (TEXT, self.STATIC):
+            assert self.said(text, u)[0] == "u.csv: 3 of 93 references lie outside the output range and were limited"
         u[51:53] = 12.0
-        assert self.said(TEXT, u) == ["u.csv: 1 of 93 drives was limited to input_range"]
-        assert self.said(self.STATIC, u)[0] == "u.csv: 1 of 93 references lies outside the output range and was limited"
+        for text in (TEXT, self.STATIC):
+            assert self.said(text, u)[0] == "u.csv: 1 of 93 references lies outside the output range and was limited"
 
     def test_a_little_beyond_the_range_counts(self) -> None:
         """The excess is a millionth of the range, a code of a 20-bit converter."""

@@ -40,6 +40,21 @@ def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[s
     return [*said, *_held(held, samples)]
 
 
+def compensated(references: NDArray[np.bool_], drives: NDArray[np.bool_], held: int = 0) -> list[str]:
+    """Remarks on the inverse in double precision of a model with effects. Unlike the C it does not limit a reference
+    whose drive is in range, as behind a slew limit or while plays that relax are moving.
+
+    `references` (N,): those outside the output range; `drives` (N,): limited ones.
+    """
+    limited, others, free = (
+        int(np.count_nonzero(each)) for each in (references & drives, drives & ~references, references & ~drives)
+    )
+    samples, lie, they = len(drives), "lies" if free == 1 else "lie", "it is" if free == 1 else "they are"
+    where = f"{lie} outside the output range, with drives in range"
+    inside = f"{free} of {samples} references {where}; in the C {they} limited"
+    return [*([inside] if free else []), *inverse(samples, limited, others, held)]
+
+
 def _held(number: int, samples: int) -> list[str]:
     are, them = ("is", "it") if number == 1 else ("are", "them")
     said = f"{number} of {samples} samples {are} not finite; the answer before {them} was held"
