@@ -17,7 +17,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.chain import moving, moving_fixed, moving_float
-from hystgen.effects.plays import DASHPOT, DILATED, FASTEST, NEWTON_TRIES, POLYNOMIAL, SECANTS
+from hystgen.effects.plays import DASHPOT, DILATED, FASTEST, NEWTON_TRIES, PLAIN, POLYNOMIAL, SECANTS, STRAIGHT
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
@@ -43,19 +43,32 @@ def rising(rng: np.random.Generator, kinks: int) -> Callable[[int], int]:
     return total
 
 
-def found_in(total: Callable[[int], int], begin: int, slope: int, h: int, near: int = 0) -> tuple[int, int]:
-    """The answer of a search in fixed point, and its number of tries."""
+def found_in(
+    total: Callable[[int], int], begin: int, slope: int, h: int, near: int = 0, smooth: bool = False
+) -> tuple[int, int]:
+    """The answer of a search in fixed point, and its number of tries; `smooth`: with the slopes that it then takes."""
     tries = [0]
 
     def sum_at(_: Any, state: Any, w: int) -> int:
         tries[0] += state is s
+        s.elements.found[0] = w
         return total(w)
 
-    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near, rate_bits=RATE_BITS))
+    def slope_at(_: Any, __: Any, w: int) -> int:
+        assert smooth
+        return total(w + 1) - total(w)
+
+    def straight(_: Any, __: Any, w: int, to: int) -> bool:
+        return total(to) - total(w) == (to - w) * (total(w + 1) - total(w))
+
+    kind = {"moves": PLAIN, "bends": STRAIGHT, "elements": SimpleNamespace(element=smooth * [None])}
+    t = SimpleNamespace(moving=SimpleNamespace(farthest=FARTHEST, near=near, rate_bits=RATE_BITS, **kind))
+    t.moving.elements.straight = 1000
     rate = [min(max(2**RATE_BITS // slope, 1), FASTEST)]
     s = SimpleNamespace(plays=SimpleNamespace(play=[begin]), search=SimpleNamespace(rate=rate))
+    s.elements = SimpleNamespace(steep=[-1], found=[begin], departs=[0])
     with jit.plain():
-        answer = moving_fixed.search(sum_at, None)(t, s, h)
+        answer = moving_fixed.search(sum_at, None, straight, slope_at)(t, s, h)
     return int(answer), tries[0]
 
 
@@ -81,6 +94,27 @@ def test_a_search_in_fixed_point_ends_at_the_nearer_neighbour(seed: int) -> None
             assert abs(total(answer) - h) == min(h - total(low), total(high) - h)
         most = max(most, tries)
     assert most <= 1 + SECANTS + 32
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_search_along_exact_slopes_ends_within_a_step(seed: int) -> None:
+    """Near the solution it ends with a step along the slope; over several kinks it takes few tries."""
+    rng = np.random.default_rng(seed)
+    most = 0
+    for _ in range(150):
+        at = sorted(rng.integers(-FARTHEST, FARTHEST, int(rng.integers(0, 6))).tolist())
+        slopes = [int(x) for x in rng.integers(10**4, 10**6, len(at) + 1)]
+
+        def total(w: int, at: list[int] = at, slopes: list[int] = slopes) -> int:
+            bends = zip(at, slopes, slopes[1:], strict=False)
+            return slopes[0] * w + sum((after - before) * max(w - knot, 0) for knot, before, after in bends)
+
+        target = int(rng.integers(-FARTHEST, FARTHEST))
+        h = total(target) + int(rng.integers(-(10**4) // 2, 10**4 // 2))
+        answer, tries = found_in(total, int(rng.integers(-FARTHEST, FARTHEST)), 10**5, h, smooth=True)
+        assert abs(answer - target) <= 1
+        most = max(most, tries)
+    assert most <= 1 + SECANTS
 
 
 def test_slopes_of_no_use_cost_a_search_all_its_tries() -> None:

@@ -103,7 +103,7 @@ HYSTGEN_APART bool hystgen_inverse_lands(hystgen_inverse_t *self) {
         return false;
     }
     HYSTGEN_ROLLED
-    for (first = 1; first <= self->released; ++first) {
+    for (first = 1; first <= HYSTGEN_N_PLAYS && first <= self->released; ++first) {
         if (hystgen_resting(first, self->play, w) == self->play[first]) {
             break;
         }
