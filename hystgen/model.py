@@ -381,7 +381,9 @@ class Model:
                 raise EffectsError(f"{name} must have {len(drive)} finite numbers, one per sample of v")
         if np.any(np.diff(times) <= 0.0):
             raise EffectsError("t must increase from each sample to the next")
-        return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
+        found = Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
+        self.chain.require_columns([found])
+        return found
 
     def settling(self, within: float = SETTLED) -> Settling:
         """Settling times of the output after full-range steps of the drive, up and down.

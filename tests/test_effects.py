@@ -862,6 +862,14 @@ def test_logged_temperature() -> None:
         Chain(CASCADE, [effect]).simulate([Run(t, v)])
 
 
+@pytest.mark.parametrize("arithmetic", [None, "float32", "q31"])
+@pytest.mark.parametrize("inverse", [False, True])
+def test_a_logged_temperature_has_to_be_given(arithmetic: str | None, inverse: bool) -> None:
+    model = model_of("    - {name: thermal, gain_per_degree: 0.01}\nsample_time: 0.001\n")
+    with pytest.raises(EffectsError, match="the effect thermal needs the column temperature, which a record lacks"):
+        (model.inverse() if inverse else model).simulate([0.1, 0.2, 0.3], arithmetic)
+
+
 @pytest.mark.thorough
 def test_self_heating_against_an_ode_solver() -> None:
     tau, heating = 0.3, 0.7

@@ -224,15 +224,19 @@ class Chain(Ordered):
         self.cascade = cascade
         self.effects = in_order(effects)
 
+    def require_columns(self, runs: Sequence[Run]) -> None:
+        """Raise EffectsError if a run lacks a column that an effect needs."""
+        for name in sorted({column for effect in self.effects for column in effect.columns}):
+            if any(name not in run.extra for run in runs):
+                who = next(effect.name for effect in self.effects if name in effect.columns)
+                raise EffectsError(f"the effect {who} needs the column {name}, which a record lacks")
+
     def simulate(self, runs: Sequence[Run], history: Sequence[float] | None = None) -> list[Array]:
         """Outputs (N,) of each run of a session, which begins at rest in the start memory; see `join`.
 
         Raises EffectsError if a column is missing or the result of an effect has the wrong form.
         """
-        for name in sorted({column for effect in self.effects for column in effect.columns}):
-            if any(name not in run.extra for run in runs):
-                who = next(effect.name for effect in self.effects if name in effect.columns)
-                raise EffectsError(f"the effect {who} needs the column {name}, which a record lacks")
+        self.require_columns(runs)
         session = join(runs, history)
         y = self.output(session.run)
         if not np.isfinite(y).all() and np.isfinite(session.run.v).all():
