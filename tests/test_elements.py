@@ -186,3 +186,17 @@ def test_predictions_are_the_model_s() -> None:
 def test_a_plant_that_leads_is_told_of_its_other_column() -> None:
     assert any("elements with positive weights follow the lead" in text for text in identified(softening).warnings)
     assert not any("clockwise" in text or "no hysteresis" in text for text in identified(friction).warnings)
+
+
+def clockwise(v: Array) -> Array:
+    """A damper's force over its displacement, which no play follows: an element without any plays is all of it."""
+    return Dahl(sigma=0.05, limit=0.4).simulate(v)
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_elements_that_leave_the_plays_no_slope_are_left_out(held: bool) -> None:
+    made = [Record(f"record {k}", 1e-3 * np.arange(len(v)), v, clockwise(v), sample_time=1e-3)
+            for k, v in enumerate(map(loops, (0, 1)))]  # fmt: skip
+    fit = hystgen.identify(made[0], holdout=made[1] if held else (), model="auto")
+    assert [row.model for row in fit.rows if row.part == "candidate"] == ["pi", "gpi-deadzone", "gpi-tanh"]
+    assert not fit.parameters.model.effects

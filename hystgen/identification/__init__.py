@@ -10,9 +10,9 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,15 +163,22 @@ def identify(
         if model == "auto" and elements.shown(courses, steps):
             kinds = (*kinds, PARALLEL)
         if held:
-            tried = [_best(courses, held, kind, how) for kind in kinds]
+            tried = [each for _, each in _each(kinds, lambda kind: _best(courses, held, kind, how))]
             done = tried[_choose(tried)]
             rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
             fitted, compared, held_errors = done.fitted, done.compared, done.errors
         else:
-            rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how)
-            if reason:
-                reported.append(reason)
-            fitted, compared = gpi.solve(courses, kind, how)
+            trial = _trial([] if loading_curve else courses, kinds, how)
+            try:
+                fitted, compared = gpi.solve(courses, trial.kind, how)
+            except IdentificationError:
+                if trial.kind != PARALLEL:
+                    raise
+                trial = _trial(courses, kinds[:-1], how)
+                fitted, compared = gpi.solve(courses, trial.kind, how)
+            rows, held_errors = trial.rows, trial.errors
+            if trial.reason:
+                reported.append(trial.reason)
     masks = used_of(fit_records, compared, False)
     if held:
         masks += used_of(held_records, done.held, True)
@@ -371,28 +378,48 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
     return places
 
 
-def _trial(
-    courses: Sequence[Course], kinds: Sequence[str], how: gpi.How
-) -> tuple[list[ErrorRow], str, list[pi.FreeRunErrors], str]:
+def _each(kinds: Sequence[str], fit: Callable[[str], _Tried]) -> list[tuple[str, _Tried]]:
+    """The fits of each kind; elements are left out if they explain so much that the plays have no slope left."""
+    found = []
+    for kind in kinds:
+        try:
+            found.append((kind, fit(kind)))
+        except IdentificationError:
+            if kind != PARALLEL:
+                raise
+    return found
+
+
+class _Trial(NamedTuple):
     """Rows of models fitted to the first part of each record and compared with the remainder, the kind selected, its
     errors, and the reason if there are no rows."""
+
+    rows: list[ErrorRow]
+    kind: str
+    errors: list[pi.FreeRunErrors]
+    reason: str
+
+
+def _trial(courses: Sequence[Course], kinds: Sequence[str], how: gpi.How) -> _Trial:
+    """The trial of the kinds; without courses, of the only kind."""
     if not courses:
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records besides the loading curve")
-        return [], kinds[0], [], ""
+        return _Trial([], kinds[0], [], "")
     short = "too short, or its first part covers too little of the drive's range, to hold out its end; give --holdout"
     instead = "" if len(kinds) == 1 else f". With nothing held out auto cannot choose: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
         front, end = _parted(item)
         if front.used < SHORTEST or np.ptp(item.v[front.first : front.last]) == 0.0:
-            return [], kinds[0], [], f"{item.name}: {short}{instead}"
+            return _Trial([], kinds[0], [], f"{item.name}: {short}{instead}")
         fronts.append(front)
         ends.append(end)
     try:
-        tried = [_try(fronts, ends, kind, how) for kind in kinds]
+        found = _each(kinds, lambda kind: _try(fronts, ends, kind, how))
     except IdentificationError as failure:
-        return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
+        return _Trial([], kinds[0], [], f"nothing was held out: {failure}{instead}")
+    tried = [each for _, each in found]
     chosen = _choose(tried)
     best = tried[chosen]
     own = ErrorRow.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
@@ -400,7 +427,7 @@ def _trial(
     rows += [own, replace(best.held_out, model="trial")]
     # if the amplitude fades, the end alone has a smaller range; percentages of both parts refer to the whole
     whole = max(item.output_range for item in courses)
-    return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
+    return _Trial([replace(row, output_range=whole) for row in rows], found[chosen][0], best.errors, "")
 
 
 def _parted(item: Course) -> tuple[Course, Course]:
