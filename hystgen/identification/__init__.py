@@ -390,7 +390,7 @@ def _each(kinds: Sequence[str], fit: Callable[[str], _Tried]) -> list[tuple[str,
     return found
 
 
-class _Trial(NamedTuple):
+class _Chosen(NamedTuple):
     """Rows of models fitted to the first part of each record and compared with the remainder, the kind selected, its
     errors, and the reason if there are no rows."""
 
@@ -400,25 +400,25 @@ class _Trial(NamedTuple):
     reason: str
 
 
-def _trial(courses: Sequence[Course], kinds: Sequence[str], how: gpi.How) -> _Trial:
+def _trial(courses: Sequence[Course], kinds: Sequence[str], how: gpi.How) -> _Chosen:
     """The trial of the kinds; without courses, of the only kind."""
     if not courses:
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records besides the loading curve")
-        return _Trial([], kinds[0], [], "")
+        return _Chosen([], kinds[0], [], "")
     short = "too short, or its first part covers too little of the drive's range, to hold out its end; give --holdout"
     instead = "" if len(kinds) == 1 else f". With nothing held out auto cannot choose: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
         front, end = _parted(item)
         if front.used < SHORTEST or np.ptp(item.v[front.first : front.last]) == 0.0:
-            return _Trial([], kinds[0], [], f"{item.name}: {short}{instead}")
+            return _Chosen([], kinds[0], [], f"{item.name}: {short}{instead}")
         fronts.append(front)
         ends.append(end)
     try:
         found = _each(kinds, lambda kind: _try(fronts, ends, kind, how))
     except IdentificationError as failure:
-        return _Trial([], kinds[0], [], f"nothing was held out: {failure}{instead}")
+        return _Chosen([], kinds[0], [], f"nothing was held out: {failure}{instead}")
     tried = [each for _, each in found]
     chosen = _choose(tried)
     best = tried[chosen]
@@ -427,7 +427,7 @@ def _trial(courses: Sequence[Course], kinds: Sequence[str], how: gpi.How) -> _Tr
     rows += [own, replace(best.held_out, model="trial")]
     # if the amplitude fades, the end alone has a smaller range; percentages of both parts refer to the whole
     whole = max(item.output_range for item in courses)
-    return _Trial([replace(row, output_range=whole) for row in rows], found[chosen][0], best.errors, "")
+    return _Chosen([replace(row, output_range=whole) for row in rows], found[chosen][0], best.errors, "")
 
 
 def _parted(item: Course) -> tuple[Course, Course]:
