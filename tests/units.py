@@ -7,6 +7,7 @@ The model is called `hystgen`, so that its macros and tables have the names that
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from modelfiles import BRAKED, CALM, CHAINS, LED, STEADY
@@ -121,15 +122,21 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
         text = (folder / file).read_text(encoding="utf-8").splitlines()
         numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
         own = numbered + "hystgen_operator_t\n" * any("hystgen_operator_t" in line for line in text)
-        facts = one.family.facts | one.variant.facts | one.kernel_facts
+        facts = one.family.facts | one.variant.facts | _kernel_facts(one)
         chosen = "".join(runtime.forms(own, facts)).splitlines()
         found |= {(file, int(line)) for line in chosen if line.isdecimal()}
     return found
 
 
 def _compensator(name: str, arithmetic: str, engine: str) -> EmittedModel:
+    """With the types that models share, from which nothing is left out."""
     one = model(name)
-    return module.compensator(one, Options("both", arithmetic, engine, "self-contained"))
+    return module.compensator(one, Options("both", arithmetic, engine, "shared-runtime"))
+
+
+def _kernel_facts(one: EmittedModel) -> frozenset[str]:
+    """What kernels know that models do not share."""
+    return replace(one, options=replace(one.options, layout="self-contained")).kernel_facts
 
 
 def _states(one: EmittedModel) -> list[str]:
@@ -165,7 +172,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     one = _compensator(name, arithmetic, engine)
     chain, loop = one.variant.chain, one.family.loop
-    facts = one.family.facts | one.variant.facts | one.kernel_facts
+    facts = one.family.facts | one.variant.facts | _kernel_facts(one)
     types = [state.text for state in one.glue.states.values()] if one.glue else []
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     text = "\n".join(
@@ -173,7 +180,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             "#define HYSTGEN_CONFIGURED",
             *["#define HYSTGEN_CHAIN"] * chain,
             *["#define HYSTGEN_LOOP", "#define HYSTGEN_STATUS_SLEW_LIMITED 16u /* never set */"] * loop,
-            *(f"#define {fact}" for fact in sorted(one.variant.facts | one.kernel_facts)),
+            *(f"#define {fact}" for fact in sorted(one.variant.facts | _kernel_facts(one))),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {one.corners}",
             *interface.limits(one),
@@ -189,6 +196,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(line for file in one.variant.sources() for line in _included(file, facts)),
         ]
     )
+    own = text.replace(f"{one.names.rt}_", "hystgen_").replace(f"{one.names.RT}_", "HYSTGEN_")
     source = folder / f"unit_{name}_{arithmetic}_{engine}.c"
-    source.write_text(text + "\n")
+    source.write_text(own + "\n")
     return source
