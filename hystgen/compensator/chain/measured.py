@@ -35,11 +35,8 @@ SAID_BY = 10.0
 this: it is the order of magnitude within which a bound is useful."""
 
 
-KEPT = 300
-"""[references] Number whose drives are kept, of `SAMPLES` numbers each: those of fifty emissions, in 2 MB. No run sets
-this: it is more than a user emits one after another, and far less than what a process takes anyway."""
-
-_kept: dict[object, Array] = {}
+_kept: dict[object, dict[bytes, Array]] = {}
+"""Drives of the last chain by reference: an emission in another arithmetic, engine or layout asks for them again."""
 
 
 @dataclass(frozen=True)
@@ -89,12 +86,13 @@ def _exact(chain: Chain, how: Compensation, references: Run, ends: tuple[float, 
     record = hashlib.sha256(references.t.tobytes() + references.v.tobytes())
     for name, values in sorted(references.extra.items()):
         record.update(name.encode() + values.tobytes())
-    key = chain.cascade, effects, how, ends, record.digest()
+    key, reference = (chain.cascade, effects, how, ends), record.digest()
     if key not in _kept:
-        _kept[key] = Compensator(chain, how).drives(references, ends)
-        if len(_kept) > KEPT:
-            del _kept[next(iter(_kept))]
-    return _kept[key]
+        _kept.clear()
+        _kept[key] = {}
+    if reference not in _kept[key]:
+        _kept[key][reference] = Compensator(chain, how).drives(references, ends)
+    return _kept[key][reference]
 
 
 def _upward(x: float) -> float:

@@ -37,14 +37,17 @@ SLOPE = 27
 BACK = 28
 """Bits of shares of a piece over shares of its rise."""
 
-STEEP = 3
-"""Bits of a slope that its computation drops, as it sums up up to `DEGREE` times as much as the curve's."""
-
-FARTHEST = 2**24
-"""[steps] Largest distance over which the sum is computed along its slope, which has at most 38 bits."""
-
 DEGREE = 5
 """Degree of the curve's polynomials."""
+
+STEEP = (DEGREE - 1).bit_length()
+"""Bits of a slope that its computation drops: its terms are up to `DEGREE` times as large as the curve's. Derived."""
+
+SUMMED = 38
+"""Bits of the slope of the sum, by which a distance is multiplied."""
+
+FARTHEST = 2 ** (62 - SUMMED)
+"""[steps] Largest distance over which the sum is computed along its slope, so that the product has 62 bits. Derived."""
 
 ALLOWED = 2.0**-30
 """Error allowed for the curve: about that of a slope with `SLOPE` bits over a quarter of a width."""
