@@ -547,8 +547,9 @@ def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str
     assert stated / 10.0 <= worst <= 10.0 * stated
 
 
-def test_what_engines_share_of_the_search_for_an_error_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The drives in double precision serve both engines, but no other model, arithmetic or settings."""
+def test_what_emissions_share_of_the_search_for_an_error_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drives in double precision serve both engines, but no other model, arithmetic or settings; the error found
+    serves every emission with the same tables."""
     made: list[Run] = []
     drives = Compensator.drives
 
@@ -568,14 +569,21 @@ def test_what_engines_share_of_the_search_for_an_error_is_computed_once(monkeypa
         numbers = tables.build(one.chain, arithmetic, T, engine=engine)
         return measured.measured(numbers, one.chain, one.parameters.emit.compensation)
 
-    monkeypatch.setattr(measured, "_kept", {})
+    def forget() -> None:
+        for cache in ("_kept", "_found"):
+            monkeypatch.setattr(measured, cache, {})
+
+    forget()
     kept = []
     for *case, times in cases:
         made.clear()
         kept.append(found(*case))
         assert len(made) == times
+    made.clear()
+    assert [found(*case) for *case, _ in cases] == kept
+    assert not made
     for result, (*case, _) in zip(kept, cases, strict=True):
-        monkeypatch.setattr(measured, "_kept", {})
+        forget()
         assert found(*case) == result
 
 

@@ -148,12 +148,19 @@ class _Folding:
     def _change(self, name: str, body: str) -> None:
         self.functions[name] = replace(self.functions[name], body=body)
 
+    def _naming(self, name: str) -> list[tuple[str, Function]]:
+        """The functions in which a function's name, or a longer one that ends like it, stands before a parenthesis.
+        Finding this text takes a tenth of the time of finding a call."""
+        call = f"{name}("
+        return [each for each in self.functions.items() if call in each[1].body]
+
     def _calls(self, name: str, changed: Callable[[Function, int, int, list[str]], str | None]) -> None:
         """Change every call of a function; `changed` takes the caller, the call's start and end in its body, and the
         arguments, and returns the new body."""
-        for caller, function in self.functions.items():
+        call = re.compile(rf"\b{name}\(")
+        for caller, function in self._naming(name):
             body, at = function.body, 0
-            while found := re.compile(rf"\b{name}\(").search(body, at):
+            while found := call.search(body, at):
                 end, arguments = _arguments(body, found.end())
                 new = changed(replace(function, body=body), found.start(), end, arguments)
                 at = found.end()
@@ -195,7 +202,7 @@ class _Folding:
 
     def _given(self, name: str) -> Iterator[list[str]]:
         """The arguments of every call of a function."""
-        for function in self.functions.values():
+        for _, function in self._naming(name):
             for found in re.finditer(rf"\b{name}\(", function.body):
                 yield _arguments(function.body, found.end())[1]
 

@@ -36,7 +36,13 @@ this: it is the order of magnitude within which a bound is useful."""
 
 
 _kept: dict[object, dict[bytes, Array]] = {}
-"""Drives of the last chain by reference: an emission in another arithmetic, engine or layout asks for them again."""
+"""Drives of the last chain by reference: an emission with the other engine asks for them again."""
+
+_found: dict[object, Measured] = {}
+"""The errors of the last `MOST_KEPT` tables: an emission of another operator or layout asks for them again."""
+
+MOST_KEPT = 64
+"""[models] A rule for the memory of `_found`: their tables take a few megabytes."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,30 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     references over the whole range of the output: triangular loops and multisines at `SPEEDS`; logged columns stay at
     the value at which their effect changes nothing. Errors of tables that the references do not reach, but a caller who
     sets the travel does, are added as they are known."""
+    codes = compiled.codes
+    lsbs = None if codes is None else (codes.drive_lsb, codes.output_lsb)
+    about = compiled.seconds, compiled.max_rate, compiled.ahead, lsbs, SAMPLES
+    key = _key(chain, how), _content(compiled.tables), about
+    if key not in _found:
+        while len(_found) >= MOST_KEPT:
+            del _found[next(iter(_found))]
+        _found[key] = _searched(compiled, chain, how)
+    return _found[key]
+
+
+def _key(chain: Chain, how: Compensation) -> object:
+    """All that the drives of the compensator in double precision depend on, besides the references and the range."""
+    return chain.cascade, tuple((type(each), repr(each.model_dump())) for each in chain.effects), how  # keys hold lists
+
+
+def _content(table: object) -> object:
+    """A table as a key of a dictionary."""
+    if isinstance(table, np.ndarray):
+        return table.dtype.str, table.tobytes()
+    return tuple(map(_content, table)) if isinstance(table, tuple) else table
+
+
+def _searched(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     t, codes = compiled.tables, compiled.codes
     drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
     ends = float(t.limits.drive.low[0]) * drive, float(t.limits.drive.high[0]) * drive
@@ -81,12 +111,11 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
 
 def _exact(chain: Chain, how: Compensation, references: Run, ends: tuple[float, float]) -> Array:
     """The drives of the compensator in double precision. They take most of the time to emit a model and are the same
-    for each operator, engine and layout, so they are kept for the next."""
-    effects = tuple((type(each), repr(each.model_dump())) for each in chain.effects)  # their keys may hold lists
+    for each engine, so they are kept for the next."""
     record = hashlib.sha256(references.t.tobytes() + references.v.tobytes())
     for name, values in sorted(references.extra.items()):
         record.update(name.encode() + values.tobytes())
-    key, reference = (chain.cascade, effects, how, ends), record.digest()
+    key, reference = (_key(chain, how), ends), record.digest()
     if key not in _kept:
         _kept.clear()
         _kept[key] = {}
