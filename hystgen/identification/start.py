@@ -74,12 +74,47 @@ def estimated(
     if all(item.history is not None for item in courses):
         return list(courses)
     begun = [unknown(item) for item in courses]
+    found = _memories(tuple(map(_Alike, begun)), tuple(stages), wanted)
+    return [
+        item if start is None else replace(item, start=start, first=item.begin)
+        for item, start in zip(begun, found, strict=True)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Alike:
+    """A course, equal to any other from which the same start memory follows."""
+
+    item: Course
+
+    @functools.cached_property
+    def _content(self) -> tuple[object, ...]:
+        item = self.item
+        signals = item.v.tobytes(), item.y.tobytes()
+        return *signals, item.history, item.first, item.last, item.begin, item.approach, item.forgotten
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Alike) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+
+@functools.lru_cache(maxsize=4)
+def _memories(
+    courses: tuple[_Alike, ...], stages: tuple[Stage, ...], wanted: int | tuple[float, ...] | None
+) -> list[StartMemory | None]:
+    """The start memories of courses, None where none is found.
+
+    The last ones are cached: looking for outliers, fitting the weights and fitting each kind of front ask for the same.
+    """
+    begun = [each.item for each in courses]
     places = [k for k, item in enumerate(begun) if findable(item)]
     some = [begun[k] for k in places]
     seen = [joint.through_front(item, stages) for item in some]
     swing = max((float(np.ptp(item.v[item.begin : item.last])) for item in seen), default=0.0)
     if swing == 0.0:
-        return begun
+        return [item.start for item in begun]
     reach, once = pi.loop_reach(swing), None
     if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1 and wanted[-1] <= reach:
         r = np.array(wanted)
@@ -91,7 +126,7 @@ def estimated(
         here = places[first : first + TOGETHER]
         for k, item in zip(here, _started([begun[k] for k in here], stages, r, None, once), strict=True):
             begun[k] = item
-    return begun
+    return [item.start for item in begun]
 
 
 def needed(
@@ -307,14 +342,15 @@ class _System:
         moved = self._moved(states)
         edges = {*range(0, self.settled, reduction.CHUNK), *moved[moved < self.settled].tolist(), self.settled}
         edges |= {min(item.begin, self.settled)}
-        table = np.concatenate([self.tail[:, :-1], np.zeros((len(self.tail), n)), self.tail[:, -1:]], axis=1)
+        tables = [np.concatenate([self.tail[:, :-1], np.zeros((len(self.tail), n)), self.tail[:, -1:]], axis=1)]
         for a, b in itertools.pairwise(sorted(edges)):
-            wanted = a >= item.begin
-            found = reduction.segment_rows(item.v[a:b], item.y[a:b], r, states, wanted)
-            change = self.change(p * (a < moved))
-            made = np.concatenate([found[:, :-1], found[:, :1] * change, found[:, -1:]], axis=1)
-            table = reduction.triangle(table, made)
-        return table[1:, 1:]
+            found = reduction.segment_rows(item.v[a:b], item.y[a:b], r, states, a >= item.begin)
+            if len(found):
+                change = self.change(p * (a < moved))
+                tables.append(np.concatenate([found[:, :-1], found[:, :1] * change, found[:, -1:]], axis=1))
+            if sum(map(len, tables)) > reduction.CHUNK:
+                tables = [reduction.triangle(*tables)]
+        return reduction.triangle(*tables)[1:, 1:]
 
     def left(self, slopes: Array, p: Array) -> float:
         """Root of the sum of squared errors for a memory and weights, without reducing a table of all plays."""

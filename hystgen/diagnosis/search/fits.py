@@ -130,8 +130,10 @@ class _Block:
         free = other.nuisances(self._item, self._offset)
         if len(free) != self._free:  # a different spectrum may have a different number of states
             return self._begun(self._here)
-        held, factors = self.held, self._factors.copy()
-        factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
+        held, factors = self.held, self._factors
+        if held.any():
+            factors = factors.copy()
+            factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
         return np.asarray(factors[1:] @ free[1:])
 
     def opened(self) -> Array:
