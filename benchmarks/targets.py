@@ -412,12 +412,20 @@ class Bench:
         self._folder = folder
         self._number = itertools.count()
         self._emitted: dict[tuple[int, str, str, float], sources.Sources] = {}
+        self._images: dict[tuple[Case, str], emulator.Image] = {}
         self._worst: dict[Case, list[Reals]] = {}
         self._worst_odd: dict[tuple[Case, bool], list[Reals]] = {}
 
     def image(self, case: Case, engine: str) -> emulator.Image:
-        """A strict build of emitted code with both operators, or of the textbook loop with one."""
-        files = self._textbook(case) if engine == "textbook" else self._module(case, engine)
+        """A strict build of emitted code with both operators, built once, or of the textbook loop with one."""
+        if engine == "textbook":
+            return self._build(case, self._textbook(case))
+        about = replace(case, operator="both"), engine
+        if about not in self._images:
+            self._images[about] = self._build(case, self._module(case, engine))
+        return self._images[about]
+
+    def _build(self, case: Case, files: sources.Sources) -> emulator.Image:
         compiler = cross.find(case.target, case.compiler)
         place = self._folder / f"build-{next(self._number)}"
         entry = f"hystgen_harness_{files.operators[0]}"
