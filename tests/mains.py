@@ -1,9 +1,16 @@
-"""A C program that replays recorded calls of an emitted operator, shared by tests that observe its run."""
+"""A C program that replays recorded calls of an emitted model, shared by tests that observe its run."""
 
 _MAIN = """\
 #include "{name}.h"
 #include <stdio.h>
-int main(void)
+{replays}int main(int count, char **words)
+{{
+    return count > 1 && words[1][0] == 'f' ? forward() : inverse();
+}}
+"""
+
+_REPLAY = """\
+static int {op}(void)
 {{
     static {name}_{op}_t self;
     int call;
@@ -25,8 +32,9 @@ int main(void)
 """
 
 
-def c_main(name: str, op: str) -> str:
-    """Text of the program for operator `op` of the model `name`. For each call it reads a byte, 128 or more if the
-    status is not to be read, and a number for the argument."""
-    commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
-    return _MAIN.format(name=name, op=op, commit=commit)
+def c_main(name: str) -> str:
+    """Text of the program for the model `name`, whose argument is an operator. For each call it reads a byte, 128 or
+    more if the status is not to be read, and a number for the argument."""
+    commits = {"forward": "", "inverse": f"{name}_inverse_commit(&self, x);"}
+    replays = "".join(_REPLAY.format(name=name, op=op, commit=commit) for op, commit in commits.items())
+    return _MAIN.format(name=name, replays=replays)

@@ -256,13 +256,13 @@ def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_pa
     one = model(name)
     hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
+    (tmp_path / "main.c").write_text(c_main(name))
+    flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    gcc.run([*flags, "-I", tmp_path, tmp_path / "main.c", tmp_path / f"{name}.c", "-o", tmp_path / "run"])
     for op in ("forward", "inverse"):
-        (tmp_path / "main.c").write_text(c_main(name, op))
-        flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-        gcc.run([*flags, "-I", tmp_path, tmp_path / "main.c", tmp_path / f"{name}.c", "-o", tmp_path / "run"])
         for record, call, x in signals.suite(numbers, real, op == "inverse", 20_000):
             calls = np.rec.fromarrays([call, x.astype(real)], dtype=[("call", "u1"), ("x", real)])
-            done = subprocess.run([tmp_path / "run"], input=calls.tobytes(), capture_output=True, check=False)
+            done = subprocess.run([tmp_path / "run", op], input=calls.tobytes(), capture_output=True, check=False)
             assert done.returncode == 0, f"{op}, {record}: {done.stderr.decode()}"
 
 

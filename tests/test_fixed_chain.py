@@ -421,6 +421,9 @@ def checked(
         yield op, call, x, subprocess.run([folder / op, str(n)], input=given, capture_output=True, check=False)
 
 
+REPEATED = 8000
+"""[calls] Number that the reference repeats in plain Python, at 0.1 ms each."""
+
 PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 
 
@@ -429,7 +432,8 @@ PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 @pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """States stay within the ranges for which their formats were chosen and which the proof assumes."""
+    """States stay within the ranges for which their formats were chosen and which the proof assumes. The reference
+    repeats the first calls, two of each kind of argument that `wild` makes; the C makes all."""
     one, real = model(PROVED[name]), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, "loop")
     flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
@@ -437,9 +441,9 @@ def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_pa
         assert done.returncode == 0, done.stderr.decode()
         answer = np.frombuffer(done.stdout, real, len(x))
         status = np.frombuffer(done.stdout[answer.nbytes :], np.uint8)
-        wanted, bits = reference.answers(numbers, op == "inverse", call, x)
-        assert np.array_equal(answer, wanted.astype(real))
-        assert np.array_equal(status, bits)
+        wanted, bits = reference.answers(numbers, op == "inverse", call[:REPEATED], x[:REPEATED])
+        assert np.array_equal(answer[:REPEATED], wanted.astype(real))
+        assert np.array_equal(status[:REPEATED], bits)
 
 
 @pytest.mark.slow(one_in=4)
