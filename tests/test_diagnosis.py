@@ -1081,6 +1081,10 @@ class TestOwnEffects:
 
         return five_records(output)
 
+    def drifting(self) -> list[Record]:
+        """Records of plays that drift."""
+        return five_records(lambda t, v: np.asarray(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 0.05 * t))
+
     @pytest.mark.thorough(but_one_in=2)
     @pytest.mark.parametrize(("amplitude", "period"), [(2.0, 3.3), (-6.0, 11.0)])
     def test_it_is_found_named_and_added(self, tmp_path: Path, run: Call, amplitude: float, period: float) -> None:
@@ -1117,7 +1121,8 @@ class TestOwnEffects:
 
     @pytest.mark.thorough
     def test_numbers_that_make_nothing_end_its_search(self, tmp_path: Path) -> None:
-        """If the output is infinite right next to the start of the search, the effect is not named."""
+        """If the output is infinite right next to the start of the search, the effect is not named. An effect of the
+        catalogue explains the records, so that the search ends with it."""
 
         class Cliff(Effect):
             name: Literal["user:cliff"] = "user:cliff"
@@ -1125,7 +1130,7 @@ class TestOwnEffects:
             place: ClassVar[Place] = Place.ADDED
 
             def added(self, run: Run) -> Array:
-                return self.height * run.t if self.height <= 0.1 else np.full(len(run.t), np.inf)
+                return self.height * run.t**2 if self.height <= 0.1 else np.full(len(run.t), np.inf)
 
             @classmethod
             def candidates(cls, about: About) -> list[Candidate]:  # noqa: ARG003
@@ -1134,16 +1139,18 @@ class TestOwnEffects:
 
                 return [Candidate("cliff", np.array([-9.0]), np.array([9.0]), np.array([0.1]), build, np.zeros(1))]
 
-        records = self.records(2.0, 11.0)
+        records = self.drifting()
         given: dict[str, Any] = {"holdout": records[3:], "history": [0.0]}
         content = hystgen.diagnose(_model(tmp_path), records[:3], effects=[Cliff], **given).content
-        assert "user:cliff" not in [effect["name"] for effect in content["effects"]]
+        (effect,) = content["effects"]
+        assert effect["name"] != "user:cliff"
 
     @pytest.mark.thorough
     def test_it_sees_all_samples(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Trials of catalogue effects use fewer samples, but a user's code may rely on even steps."""
         monkeypatch.setattr(acceptance, "SCREENED", 500)
         monkeypatch.setattr(acceptance, "SEARCHED", 800)
+        monkeypatch.setattr(parallel, "cores", lambda: 1)  # another process would fill a list of its own
         seen = []
 
         class Even(Effect):
@@ -1162,7 +1169,7 @@ class TestOwnEffects:
 
                 return [Candidate("even", np.array([-9.0]), np.array([9.0]), np.array([0.1]), build, np.zeros(1))]
 
-        records = self.records(2.0, 11.0)
+        records = self.drifting()
         given: dict[str, Any] = {"holdout": records[3:], "history": [0.0]}
         steps = []
         look, enough = screening.thinned, math.inf
