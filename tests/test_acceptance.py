@@ -1067,6 +1067,7 @@ def envelopes_bend_either_way() -> Any:
 
 def wild(moves: float, wilder: float, monkeypatch: pytest.MonkeyPatch) -> bool:
     """Whether an inverse is wild, with a gain of 0.5 and noise of 0.1."""
+    monkeypatch.setattr(harm, "_drives", lambda *_: SimpleNamespace(wilder=wilder))
     monkeypatch.setattr(harm, "_over", lambda *_: harm.Wild(moves, moves, 0.5, wilder))
     model: Any = None
     return harm.wild(model, model, [model], 0.5, 0.1) is not None

@@ -53,15 +53,36 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
     The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
-    found = [each for item in held if (each := _over(extended, plain, item, gain, noise)) is not None]
+    drives = [each for item in held if (each := _drives(extended, plain, item)) is not None]
+    if all(each.wilder <= acceptance.WILDER for each in drives):
+        return None
+    found = [one for each in drives if (one := _over(extended, plain, each, gain, noise)) is not None]
     worst = max(found, key=lambda each: each.moves, default=None)
     if worst is None or worst.wilder <= acceptance.WILDER:
         return None
     return worst if worst.moves > acceptance.BEYOND_GAIN * max(gain, noise) else None
 
 
-def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
-    """Comparison of the two inverses over one record; None if an inverse fails or too few samples are compared."""
+@dataclass(frozen=True)
+class _Drives:
+    """The drives of both inverses for a reference made of one record; `at`: its compared samples."""
+
+    t: Array
+    extra: dict[str, Array]
+    at: NDArray[np.intp]
+    reference: Array
+    ours: Array
+    theirs: Array
+
+    @property
+    def wilder(self) -> float:
+        """rms second difference of the drive with effects, divided by that of the plain inverse's drive."""
+        ours, theirs = (float(np.sqrt(np.mean(np.diff(v, 2) ** 2))) for v in (self.ours, self.theirs))
+        return ours / theirs if theirs > 0.0 else math.inf
+
+
+def _drives(extended: Model, plain: Model, item: Item) -> _Drives | None:
+    """Both inverses over one record; None if one fails or too few samples are compared."""
     end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]
@@ -70,21 +91,26 @@ def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) 
     t, extra = item.run.t[:end], {name: column[:end] for name, column in item.run.extra.items()}
     known = np.flatnonzero(item.known)
     y = np.interp(np.arange(end), known, item.y[known])
-    reference = _smooth(y)
     try:
         level = float(np.mean((_moved(extended, item.run.v[:end], t, extra) - y)[at]))
-        reference = reference + level
-        shaken = reference + _smooth(noise * np.random.default_rng(SEED).standard_normal(end))
-        ours, noisy = (_drive(extended, u, t, extra) for u in (reference, shaken))
-        theirs = _drive(plain, reference, t, extra)
-        behind, behind_noisy = (_moved(plain, v, t, extra) for v in (ours, noisy))
-        other = _moved(extended, theirs, t, extra)
+        reference = _smooth(y) + level
+        return _Drives(t, extra, at, reference, *(_drive(each, reference, t, extra) for each in (extended, plain)))
     except (EffectsError, NotInvertibleError):
         return None
-    moves = apart(_rms(behind, reference, at), _rms(behind_noisy, behind, at))
-    rough = [float(np.sqrt(np.mean(np.diff(v, 2) ** 2))) for v in (ours, theirs)]
-    wilder = rough[0] / rough[1] if rough[1] > 0.0 else math.inf
-    return Wild(moves, _rms(other, reference, at), gain, wilder)
+
+
+def _over(extended: Model, plain: Model, drives: _Drives, gain: float, noise: float) -> Wild | None:
+    """Comparison of the two inverses over one record; None if an inverse fails on the noise."""
+    t, extra, reference = drives.t, drives.extra, drives.reference
+    shaken = reference + _smooth(noise * np.random.default_rng(SEED).standard_normal(len(t)))
+    try:
+        noisy = _drive(extended, shaken, t, extra)
+        behind, behind_noisy = (_moved(plain, v, t, extra) for v in (drives.ours, noisy))
+        other = _moved(extended, drives.theirs, t, extra)
+    except (EffectsError, NotInvertibleError):
+        return None
+    moves = apart(_rms(behind, reference, drives.at), _rms(behind_noisy, behind, drives.at))
+    return Wild(moves, _rms(other, reference, drives.at), gain, drives.wilder)
 
 
 def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
