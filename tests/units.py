@@ -55,7 +55,6 @@ ANALYSED = (
     ("relaxing", "float32", "loop"),
     ("quick", "q31", "loop"),
     ("relaxing", "q15", "loop"),
-    ("viscous_twin", "q15", "loop"),
     ("bumpy", "q15", "loop"),
     ("soft_dashpot", "q31", "loop"),
     ("dilated", "q15", "loop"),
@@ -66,7 +65,6 @@ ANALYSED = (
     ("led", "q31", "corners"),
     ("forgetful", "float32", "loop"),
     ("forgetful", "q31", "loop"),
-    ("gliding", "float32", "loop"),
     ("gliding", "q15", "loop"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
@@ -74,6 +72,8 @@ of `UNITS` has it there."""
 
 UNITS = (
     *ANALYSED,
+    ("gliding", "float32", "loop"),
+    ("viscous_twin", "q15", "loop"),
     ("two_branches", "float32", "loop"),
     ("bent", "q31", "loop"),
     ("bent", "float64", "corners"),
