@@ -246,7 +246,7 @@ BOUNDS = {
     "files that name an effect outside its folder": (1, 0),
     "class names in several files": (1, 0),
     "files of C": (92, 120),
-    "lines of C": (7_300, 5_000),
+    "lines of C": (7_200, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; nothing raises it."""
 

@@ -305,8 +305,7 @@ class Variant:
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
         files = ["compensator/clamp.c"]
-        if not self.chain:
-            files += self.family.codes
+        files += self.family.codes
         files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         return (*files, "compensator/drive.c", *own, "compensator/status.c")
@@ -515,6 +514,8 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
 def forms(source: str, facts: Collection[str]) -> list[str]:
     """The text of a file with its conditions on facts resolved, once for each operator if it serves both. The argument
     `operator_x` is then named as in that operator's step."""
+    moved = APART if "HYSTGEN_HAS_MOVES_APART" in facts else "static inline "
+    source = source.replace("HYSTGEN_APART_IF_MOVED ", moved)
     if "hystgen_operator_" not in source:
         return [chosen(source, facts)]
     return [
