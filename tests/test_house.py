@@ -242,7 +242,7 @@ BOUNDS = {
     "lines that ask `.fixed`": (10, 10),
     "lines with `Any`": (282, 300),
     "`fmt: skip`": (1, 30),
-    "tuples of numbered slots": (25, 0),
+    "tuples of numbered slots": (24, 0),
     "files that name an effect outside its folder": (1, 0),
     "class names in several files": (1, 0),
     "files of C": (92, 120),
