@@ -315,7 +315,7 @@ def _of_loop(what: str, file: str, old: str, new: str, model: str, arithmetic: s
 
 # At least one mutant of each file that models with effects are made of
 OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
-    ("a limited output code drops status", "compensator/chain/signals.c", "*status |= ", "*status = ", "quick", "q31"),
+    ("a limited output code drops status", "compensator/code.c", "*status |= ", "*status = ", "quick", "q31"),
     ("travel loses the remainder", "effects/ageing/ageing.c", "self->low = change - (next - high);",
      "self->low = change - change;", "worn", "float32"),
     ("a set travel keeps an old remainder", "effects/ageing/ageing.c", "    self->low = 0;\n", "", "worn", "float32"),
@@ -434,7 +434,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("what a brake is short of is nothing", "effects/slew_limit/brake.c", "reachable ? v - reachable : reachable - v",
      "reachable ? v - reachable : reachable - reachable", "braked", "float32"),
     ("a brake acts on the first drive", "effects/slew_limit/brake.c",
-     "    if (!self->moving) {", "    if (self->moving) {", "braked", "float32", 3),
+     "    if (!self->moving) {", "    if (self->moving) {", "braked", "float32"),
     ("a quiet drive is braked", "effects/slew_limit/brake.c", "hystgen_quiet_still(&self->quiet)",
      "!hystgen_quiet_still(&self->quiet)", "calm", "float32"),
     ("a kept branch is not kept", "effects/slew_limit/brake.c", "hystgen_drive_signal(self->applied)",

@@ -621,8 +621,7 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
     for number, variant in enumerate(variants):
         operators = ["forward", "inverse"]
-        functions = runtime.operator_pieces(variant, operators, "", {}, ())
-        pieces = [*shared, *runtime.state_pieces(variant, family, operators, functions)]
+        pieces = [*shared, *runtime.state_pieces(variant, family, operators)]
         sizes = cost.sizes(pieces, family, cost.Layout(4, 8, packed=False), lengths)
         types = [each.name for each in pieces if "typedef struct" in each.code]
         assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)

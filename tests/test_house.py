@@ -242,11 +242,11 @@ BOUNDS = {
     "lines that ask `.fixed`": (10, 10),
     "lines with `Any`": (282, 300),
     "`fmt: skip`": (1, 30),
-    "tuples of numbered slots": (25, 0),
+    "tuples of numbered slots": (24, 0),
     "files that name an effect outside its folder": (1, 0),
     "class names in several files": (1, 0),
     "files of C": (92, 120),
-    "lines of C": (7_300, 5_000),
+    "lines of C": (7_200, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; nothing raises it."""
 

@@ -6,12 +6,14 @@ They compile without warnings, alone and in units, and give the textbook model a
 from __future__ import annotations
 
 import ast
+import importlib
 import itertools
 import os
 import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cffi
@@ -24,7 +26,7 @@ from hystgen.compensator import reference, step, step_fixed, step_float
 from hystgen.compensator.chain import step as chain_step
 from hystgen.compensator.chain import step_fixed as chain_step_fixed
 from hystgen.compensator.chain import step_float as chain_step_float
-from hystgen.emission import declarations, runtime
+from hystgen.emission import chain, declarations, runtime
 from hystgen.emission.calls import emitted_files
 from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
@@ -296,7 +298,38 @@ def types_of_effects() -> str:
         else:
             fixed, floating = ([text[name] for name in of_group if name in text] for text in texts)
             found += ["#ifdef HYSTGEN_FIXED", *fixed, *["#else"] * bool(floating), *floating, "#endif", ""]
+    found += ["#if defined(HYSTGEN_N_PLAYS) && !defined(HYSTGEN_CONFIGURED)", *either_operator(), "#endif", ""]
     return "\n".join([*found, "#endif", ""])
+
+
+def either_operator() -> list[str]:
+    """The type of either operator of a model with every effect: the members of both, first those in every engine and
+    arithmetic."""
+    engines = {engine: (members("q31", engine), members("float32", engine)) for engine in ("corners", "loop")}
+    every = [each for sides in engines.values() for each in sides]
+    common = {text: None for text in every[0] if all(text in each for each in every)}
+    found = ["/* Either operator: the members of both. */", "typedef struct {", *common]
+    for condition, sides in zip(("#ifdef HYSTGEN_HAS_CORNERS", "#else"), engines.values(), strict=True):
+        alike = [text for text in sides[0] if text in sides[1]]
+        own = ([text for text in side if text not in alike] for side in sides)
+        found += [condition, *(text for text in alike if text not in common)]
+        found += ["#ifdef HYSTGEN_FIXED", *next(own), "#else", *next(own), "#endif"]
+    return [*found, "#endif", "} hystgen_operator_t;"]
+
+
+def members(arithmetic: str, engine: str) -> list[str]:
+    """The members of both operators in an engine; in loop, of plays that are bent and of plays that are not."""
+    family = replace(runtime.FAMILIES[arithmetic], chain=True)
+    form = importlib.import_module(f"hystgen.emission.{family.form}").FORM
+    whole = runtime.Variant(
+        engine, family, fronts=True, branches=True, chain=True, slew=True, braked=True, quiet=True, turning=True,
+        waiting=3, taps=3, elements=2 * (engine == "loop"),
+    )
+    moved = [replace(whole, moves="dashpot", bends="centre"), replace(whole, moves="play")]
+    variants = [whole] if engine == "corners" else moved
+    fields = [runtime.Field("braked_t", "braked_1"), runtime.Field("ageing_t", "ageing_1")]
+    fields += [each for t in variants for op in runtime.OPERATORS for each in chain.instance(op, t, (), form, 6)]
+    return [each.text() for each in {each.name: each for each in reversed(fields)}.values()][::-1]
 
 
 def test_the_header_of_types_is_what_is_declared() -> None:

@@ -74,10 +74,10 @@ class NamedBlock:
         kind, constants = self.kind, self.constants
         numbers = members(kind.table, constants.table)
         if not kind.rows:
-            return [writer.block(f"{kind.tabled}_table_t", self.name, numbers)]
-        rows = [", ".join(members(kind.rows.table, row)) for row in constants.rows]
-        of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows, len(rows))
-        return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
+            return [writer.entries(f"{kind.tabled}_table_t", self.name, numbers)]
+        rows = [members(kind.rows.table, row) for row in constants.rows]
+        of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows)
+        return [of_rows, writer.entries(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[NamedBlock], list[NamedBlock]]:
@@ -157,9 +157,9 @@ def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> T
     constants = macros_of(t.number)
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "drive samples held in the delay"))
-    if "forward" in chain.sides and t.of("wait").samples:
+    if t.of("wait").samples:
         tables.append(form.factors("waited", t.of("wait").share, writer))
-    if "inverse" in chain.sides and len(t.tap):
+    if len(t.tap):
         tables.append(form.factors("tap", t.tap, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
@@ -167,7 +167,7 @@ def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> T
         *form.effects(t),
     ]
     if t.moving.used:
-        moved, numbers_of_plays = form.moving(t, "inverse" in chain.sides, writer)
+        moved, numbers_of_plays = form.moving(t, writer)
         tables, constants = tables + moved, constants + numbers_of_plays
     return tables, constants
 

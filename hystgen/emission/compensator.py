@@ -7,7 +7,7 @@ import math
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -16,9 +16,10 @@ import numpy as np
 from hystgen.basics.structures import Struct
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime
+from hystgen.emission.folding import Member
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import LANGUAGE, Field, Piece, declared_type
-from hystgen.emission.text import WIDTH, Number, braces, comment_text, constant, literal, operand, structure, table
+from hystgen.emission.text import WIDTH, Number, comment_text, constant, literal, operand, structure, table
 from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
@@ -36,6 +37,72 @@ class ConstantTable:
     name: str
     text: str
     contents: tuple[tuple[str, int], ...]
+
+    @property
+    def kind(self) -> str:
+        """The type of which it is, by which its members are known."""
+        return self.contents[0][0]
+
+    def keeping(self, types: Mapping[str, str], named: Collection[Member], whole: Collection[str]) -> ConstantTable:
+        """A copy with only the members that are `named`; `types`: those of all, by name; `whole`: structures that keep
+        all, where pointers become NULL instead."""
+        return self
+
+
+@dataclass(frozen=True)
+class Columns(ConstantTable):
+    """Arrays of numbers in one structure, so compilers reach all of them from one address; `typed`: the type of the
+    numbers as written in C."""
+
+    typed: str = ""
+    columns: tuple[tuple[str, Sequence[Number]], ...] = ()
+
+    @classmethod
+    def of(cls, name: str, kind: str, typed: str, columns: Iterable[tuple[str, Sequence[Number]]]) -> Columns:
+        """The constant with these columns."""
+        columns = tuple(columns)
+        contents = tuple((kind, len(values)) for _, values in columns)
+        return cls(name, structure(typed, name, columns), contents, typed, columns)
+
+    @property
+    def kind(self) -> str:
+        return self.name
+
+    def keeping(self, types: Mapping[str, str], named: Collection[Member], whole: Collection[str]) -> ConstantTable:
+        kept = (each for each in self.columns if (self.name, each[0]) in named)
+        return self.of(self.name, self.contents[0][0], self.typed, kept)
+
+
+@dataclass(frozen=True)
+class Structures(ConstantTable):
+    """A structure, or an array of them; `declared`: its declaration; `rows`: the members of each as written in C;
+    `words`: a comment above it."""
+
+    declared: str = ""
+    rows: tuple[Sequence[str], ...] = ()
+    words: str = ""
+
+    @classmethod
+    def of(cls, name: str, kind: str, declared: str, rows: Iterable[Sequence[str]], words: str) -> Structures:
+        """The constant with these rows."""
+        rows = tuple(rows)
+        lines = filled(rows[0]).splitlines()
+        if declared.endswith("]"):
+            each = [f"{{{', '.join(row)}}}" for row in rows]
+            whole = filled(each).splitlines()
+            lines = whole if len(whole) == 1 else [*(f"    {row}," for row in each[:-1]), f"    {each[-1]}"]
+        text = constant(declared, lines)
+        return cls(name, words + text, ((kind, len(rows)),), declared, rows, words)
+
+    def keeping(self, types: Mapping[str, str], named: Collection[Member], whole: Collection[str]) -> ConstantTable:
+        wanted = {name for name in types if (self.kind, name) in named}
+        idle = {name for name, kind in types.items() if "*" in kind} - wanted
+        shown = types if self.kind in whole else wanted
+        rows = [
+            ["NULL" if name in idle else entry for name, entry in zip(types, row, strict=True) if name in shown]
+            for row in self.rows
+        ]
+        return self.of(self.name, self.kind, self.declared, rows, self.words)
 
 
 @dataclass(frozen=True)
@@ -62,47 +129,36 @@ class Writer:
         """A writer for types that the model itself defines."""
         return Writer(self.name, self.name)
 
-    def line(self, kind: str, own: str, values: str, *sizes: int) -> ConstantTable:
-        """A constant on one line."""
-        text = f"static const {self._declared(kind, own, sizes)} = {{{values}}};\n"
-        return self._table(own, text, [(kind, math.prod(sizes))])
+    def entries(self, kind: str, own: str, entries: Sequence[str], words: str = "") -> ConstantTable:
+        """A structure with these entries; `words`: a comment above it."""
+        return Structures.of(f"{self.name}_{own}", kind, self._declared(kind, own, ()), [entries], words)
 
-    def entries(self, kind: str, own: str, entries: Iterable[str]) -> ConstantTable:
-        """A structure with these entries, on as few lines as they need."""
-        return self._table(own, constant(self._declared(kind, own, ()), filled(entries).splitlines()), [(kind, 1)])
+    def rows(self, kind: str, own: str, rows: Sequence[Sequence[str]], words: str = "") -> ConstantTable:
+        """An array of structures."""
+        declared = self._declared(kind, own, (len(rows),))
+        return Structures.of(f"{self.name}_{own}", kind, declared, rows, words)
 
-    def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> ConstantTable:
-        """An array of structures, one per line; `last`: text after the last one."""
-        *first, final = [f"    {{{row}}}" for row in rows]
-        return self.lines(kind, own, [*(f"{row}," for row in first), final + last], *sizes)
-
-    def block(self, kind: str, own: str, entries: Sequence[str]) -> ConstantTable:
-        """The table of a block."""
-        lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
-        return self.lines(kind, own, lines)
-
-    def lines(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> ConstantTable:
-        """A constant with these lines between its braces."""
-        return self._table(own, words + braces(self._declared(kind, own, sizes), lines), [(kind, math.prod(sizes))])
+    def matrix(self, kind: str, own: str, rows: Sequence[Sequence[Number]]) -> ConstantTable:
+        """An array of arrays of numbers."""
+        sizes = len(rows), len(rows[0])
+        lines = filled(f"{{{entries(row)}}}" for row in rows).splitlines()
+        text = constant(self._declared(kind, own, sizes), lines)
+        return ConstantTable(f"{self.name}_{own}", text, ((kind, math.prod(sizes)),))
 
     def array(self, kind: str, own: str, values: Sequence[Number], words: str = "") -> ConstantTable:
         """An array of numbers."""
         text = table(self._typed(kind), f"{self.name}_{own}", values)
-        return self._table(own, words + text, [(kind, len(values))])
+        return ConstantTable(f"{self.name}_{own}", words + text, ((kind, len(values)),))
 
     def columns(self, kind: str, own: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> ConstantTable:
-        """Arrays of numbers in one structure, so compilers reach all of them from one address."""
-        text = structure(self._typed(kind), f"{self.name}_{own}", columns)
-        return self._table(own, text, [(kind, len(values)) for _, values in columns])
+        """Arrays of numbers in one structure."""
+        return Columns.of(f"{self.name}_{own}", kind, self._typed(kind), columns)
 
     def _typed(self, kind: str) -> str:
         return kind if kind in LANGUAGE else f"{self.prefix}_{kind}"
 
     def _declared(self, kind: str, own: str, sizes: Sequence[int]) -> str:
         return f"{self._typed(kind)} {self.name}_{own}" + "".join(f"[{size}]" for size in sizes)
-
-    def _table(self, own: str, text: str, contents: Sequence[tuple[str, int]]) -> ConstantTable:
-        return ConstantTable(f"{self.name}_{own}", text, tuple(contents))
 
 
 def filled(entries: Iterable[str]) -> str:
@@ -180,16 +236,13 @@ class Numbers:
 class Form(ABC):
     """How one kind of arithmetic writes the numbers of a model, and how it describes them if it has codes.
 
-    `apart`: first words of functions that would cost their callers stack if inlined; `limited`: fields of a curve that
-    only plays with a limit read; `solved`: fields of the loop engine's tables that only solutions read; `suffix`: of
-    the names of macros in codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`:
-    descriptions of what the setters take, in which MODEL stands for the model's name.
+    `apart`: first words of functions that would cost their callers stack if inlined; `suffix`: of the names of macros
+    in codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: descriptions of what
+    the setters take, in which MODEL stands for the model's name.
     """
 
     apart = "static"
     suffix = ""
-    limited: ClassVar[Sequence[str]] = ()
-    solved: ClassVar[Sequence[str]]
     held: ClassVar[str]
     warning = ""
     settings: ClassVar[Mapping[str, str]]
@@ -206,11 +259,11 @@ class Form(ABC):
         """The numbers of a model with effects, with these stages of saturation behind the plays."""
 
     @abstractmethod
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
+    def behind(self, t: ChainTables, writer: Writer) -> list[EmittedStage]:
         """The stages of saturation."""
 
     @abstractmethod
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
+    def moving(self, t: ChainTables, writer: Writer) -> Tabled:
         """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
@@ -286,16 +339,6 @@ def truth(x: object) -> str:
     return "true" if x else "false"
 
 
-def limits(t: AnyTables, options: Options) -> bool:
-    """Whether plays stop at a limit of their sum: only an inverse of plays alone solves for drives at one."""
-    return options.inverse and isinstance(t, Tables | FixedTables) and not t.has_front
-
-
-def solves(t: AnyTables, options: Options) -> bool:
-    """Whether an inverse solves for plays one by one, not by a search."""
-    return options.inverse and (isinstance(t, Tables | FixedTables) or not t.moving.used or t.moving.scanned)
-
-
 def pointers(
     numbers: Tables | FixedTables, places: Sequence[str], writer: Writer, whose: str = "model"
 ) -> ConstantTable:
@@ -306,11 +349,10 @@ def pointers(
 def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> ConstantTable:
     """The drives of an operator's start memories: these columns, and the direction of the last move."""
     first = 2 * (operator == "inverse")
-    rows = (
-        f"{{{', '.join([*(literal(column[j]) for column in columns), truth(numbers.ascending[j])])}}}"
-        for j in (first, first + 1)
-    )
-    return writer.line("drive_t", f"{operator}_first_drive", ", ".join(rows), 2)
+    rows = [
+        [*(literal(column[j]) for column in columns), truth(numbers.ascending[j])] for j in (first, first + 1)
+    ]
+    return writer.rows("drive_t", f"{operator}_first_drive", rows)
 
 
 @dataclass(frozen=True)
@@ -331,11 +373,6 @@ class Glue:
             op: declared_type(f"{op}_t", f"/* One {op} operator: {words[op]}. {owned} */", fields)
             for op, fields in self.fields.items()
         }
-
-    def named(self, names: Mapping[str, Collection[str]]) -> Glue:
-        """A copy with only the fields that each operator's functions use."""
-        fields = {op: [each for each in found if each.name in names[op]] for op, found in self.fields.items()}
-        return replace(self, fields=fields)
 
 
 @dataclass(frozen=True)
@@ -396,16 +433,12 @@ class EmittedModel:
 
     @property
     def kernel_facts(self) -> frozenset[str]:
-        """What the kernels know about the model; nothing if models share them."""
-        known = limits(self.numbers.tables, self.options) or self.options.layout == "shared-runtime"
-        return frozenset() if known else frozenset({"HYSTGEN_HAS_NO_LIMIT"})
-
-    @property
-    def unread(self) -> Mapping[str, Sequence[str]]:
-        """Fields of the types of its tables that none of its functions reads, by type."""
-        t, options, form = self.numbers.tables, self.options, self.form
-        wanted = {"curve_t": (limits(t, options), form.limited), "tables_t": (solves(t, options), form.solved)}
-        return {f"hystgen_{own}": fields for own, (read, fields) in wanted.items() if not read}
+        """What the kernels know about the model; nothing if models share them. Plays stop at a limit of their sum only
+        in an inverse of plays alone, which solves for drives at one."""
+        t = self.numbers.tables
+        limited = self.options.inverse and isinstance(t, Tables | FixedTables) and not t.has_front
+        known = not limited and self.options.layout != "shared-runtime"
+        return frozenset({"HYSTGEN_HAS_NO_LIMIT"} if known else ())
 
     @property
     def units(self) -> UnitTexts:

@@ -24,7 +24,6 @@ from hystgen.emission.compensator import (
     macros,
     members,
     pointers,
-    solves,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -41,9 +40,9 @@ if TYPE_CHECKING:
     from hystgen.effects.plays import FixedElementTables
     from hystgen.model import Model
 
-COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
-           ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))
-"""Fields of the loop engine's tables, their types, and whether they are read by more than solutions."""
+COLUMNS = (("threshold", "play_t"), ("weight", "int32_t"), ("slope", "int32_t"), ("reciprocal", "uint32_t"),
+           ("shift", "uint8_t"))
+"""Fields of the loop engine's tables, and the types of their arrays."""
 
 RELAXING = COLUMNS[2:]
 """The columns that the loop engine has for plays that relax."""
@@ -53,7 +52,6 @@ class FixedForm(Form):
     """Fixed point."""
 
     apart = "HYSTGEN_APART"
-    solved = (*(field for field, _, both in COLUMNS if not both), "least", "most")
     suffix = "_LSB"
     held = "never set: every code is valid"
     settings: ClassVar[Mapping[str, str]] = {
@@ -82,7 +80,7 @@ class FixedForm(Form):
         rounding = form.inverse_rounding if options.inverse else None
         return Numbers(
             t, (*macros(t), *_macros(t), *counts), tuple(_plays(t, t, options, writer)),
-            (*_pointers(t, t, options, writer), *curves),
+            (*_pointers(t, options, writer), *curves),
             _errors(options, (form.forward_error, form.inverse_error, rounding)),
             fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends.fine[0]) > 0,
             saturates=bool(ends.saturated[0] == ends.code_max[0]),
@@ -108,7 +106,7 @@ class FixedForm(Form):
         return Numbers(
             tables, (*macros(plays), *_macros(plays), *counts, *constants),
             tuple(_plays(plays, tables, options, writer)),
-            (*curves, *arrays, *_pointers(plays, tables, options, writer), *_relaxing(tables, options, writer),
+            (*curves, *arrays, *_pointers(plays, options, writer), *_relaxing(tables, writer),
              *(each for stage in stages for each in stage.arrays)),
             _errors(options, (codes.forward_error, codes.inverse_error, codes.inverse_rounding), codes.condition),
             fronts=bool(plays.fronts),
@@ -123,10 +121,10 @@ class FixedForm(Form):
             ),
         )
 
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
+    def behind(self, t: ChainTables, writer: Writer) -> list[EmittedStage]:
         return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
+    def moving(self, t: ChainTables, writer: Writer) -> Tabled:
         from hystgen.compensator.chain import moving
 
         plays: FixedMovingTables = t.moving
@@ -139,23 +137,22 @@ class FixedForm(Form):
         ]
         if plays.scanned:
             arrays = [
-                writer.line("factor_t", f"relaxing_{name}", entries(rows[1, :]))
+                writer.entries("factor_t", f"relaxing_{name}", list(map(literal, rows[1, :])))
                 for name, rows in (("late", plays.first), ("kept", plays.second))
             ]
-            if inverse:
-                arrays += [
-                    writer.array(kind, f"relaxing_{field}", list(getattr(plays.relaxed, field)))
-                    for field, kind, _ in RELAXING
-                ]
+            arrays += [
+                writer.array(kind, f"relaxing_{field}", list(getattr(plays.relaxed, field)))
+                for field, kind in RELAXING
+            ]
             return arrays, numbers
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
         arrays = [
             self.factors(name, rows, writer) for name, rows in zip(names, (plays.first, plays.second), strict=False)
         ]
         if plays.moves == moving.DASHPOT:
-            rows = [", ".join(members(type(plays.yields), row)) for row in plays.yields]
-            arrays.append(writer.rows("yield_t", "yields", rows, len(rows)))
-            arrays.append(writer.line("factor_t", "standing_share", entries(plays.seen)))
+            rows = [members(type(plays.yields), row) for row in plays.yields]
+            arrays.append(writer.rows("yield_t", "yields", rows))
+            arrays.append(writer.entries("factor_t", "standing_share", list(map(literal, plays.seen))))
             numbers += [
                 ("YIELDS", f"{len(rows)}u", "pieces of the yield of a dashpot"),
                 ("YIELD_BITS", f"{plays.yield_bits}u", "of a yield below a step of the plays' input"),
@@ -198,7 +195,7 @@ class FixedForm(Form):
         return int(t.number.drive_bits[0])
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:
-        return writer.lines("factor_t", own, [f"    {{{entries(row)}}}," for row in rows], len(rows))
+        return writer.rows("factor_t", own, [list(map(literal, row)) for row in rows])
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [
@@ -259,25 +256,19 @@ def _plays(t: FixedTables, model: AnyTables, options: Options, writer: Writer) -
     if options.engine == "corners":
         return _corner_tables(t, options, writer, model is not t)
     start = [writer.array("play_t", "model_start", list(t.start))] * (len(t.start) > 1)
-    columns = [(field, kind) for field, kind, both in COLUMNS if both or solves(model, options)]
-    return [*(writer.array(kind, field, list(getattr(t, field))) for field, kind in columns), *start]
+    return [*(writer.array(kind, field, list(getattr(t, field))) for field, kind in COLUMNS), *start]
 
 
-def _pointers(t: FixedTables, model: AnyTables, options: Options, writer: Writer) -> list[ConstantTable]:
-    """Pointers to the loop engine's tables and the ends of the plays' input, if models share the type also unread ones,
-    then NULL."""
-    solved, shared = solves(model, options), options.layout == "shared-runtime"
-    columns = [(f"{writer.name}_{field}", both) for field, _, both in COLUMNS if both or solved or shared]
-    places = [array if both or solved else "NULL" for array, both in columns]
-    ends = _ends(t) if solved or shared else []
-    return [pointers(t, [*places, *ends], writer)] * (options.engine == "loop")
+def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[ConstantTable]:
+    """Pointers to the loop engine's tables and the ends of the plays' input."""
+    places = [f"{writer.name}_{field}" for field, _ in COLUMNS]
+    return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
 
 
-def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[ConstantTable]:
-    """Pointers for the inverse of plays that relax."""
-    own = [f"{writer.name}_{'relaxing_' * ((field, kind, both) in RELAXING)}{field}" for field, kind, both in COLUMNS]
-    wanted = t.moving.scanned and options.inverse
-    return [pointers(t.plays, [*own, *_ends(t.plays)], writer, "relaxing")] * bool(wanted)
+def _relaxing(t: ChainTables, writer: Writer) -> list[ConstantTable]:
+    """Pointers for plays that relax."""
+    own = [f"{writer.name}_{'relaxing_' * ((field, kind) in RELAXING)}{field}" for field, kind in COLUMNS]
+    return [pointers(t.plays, [*own, *_ends(t.plays)], writer, "relaxing")] * bool(t.moving.scanned)
 
 
 def _ends(t: FixedTables) -> list[str]:
@@ -291,9 +282,10 @@ def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
     low, high = t.limits.play.low[0], t.limits.play.high[0]
     ends = f"{{{entries([t.limits.margin[0] - low, high + t.limits.margin[0]])}}}"
+    segments = [list(map(literal, each)) for each in (*plays, never)]
     parts = [f"{writer.name}_model_segment", literal(t.limits.offset[0]), ends, str(len(t.threshold) - 1)]
     found = [
-        writer.rows("segment_t", "model_segment", map(entries, [*plays, never]), len(t.way), last=""),
+        writer.rows("segment_t", "model_segment", segments),
         writer.entries("curve_t", "model_curve", parts),
         writer.array("int32_t", "model_start", list(t.start)),
         writer.array("int32_t", "model_zero", list(t.zero)),
@@ -319,7 +311,7 @@ def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Cons
             if kind == "back":
                 (low, high), (under, over) = t.domain[which, :], t.edge[which, :]
                 ends = [*t.argument[which, :], low - under, high + over, low, high]
-                arrays.append(writer.entries("ends_t", f"{own}_ends", map(literal, ends)))
+                arrays.append(writer.entries("ends_t", f"{own}_ends", list(map(literal, ends))))
     if options.inverse:
         counts.append(("BELOW", f"{int(t.below[INVERSE])}u", "bits of a curve back below a drive code"))
     return arrays, counts
@@ -336,17 +328,13 @@ def _pieces(t: FixedTables | Bends, which: int, own: str, writer: Writer, words:
     ]
 
 
-def _names(tables: Sequence[ConstantTable]) -> str:
-    return ", ".join(each.name for each in tables)
-
-
 def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
     """The curves of bent plays minus the plays themselves."""
     curves = [_pieces(t.bump, k, f"bump_{k + 1}", writer) for k in range(len(t.bump.pieces))]
-    rows = [f"{_names(curve)}, {n}" for curve, n in zip(curves, t.bump.pieces, strict=True)]
+    rows = [[*(each.name for each in curve), str(n)] for curve, n in zip(curves, t.bump.pieces, strict=True)]
     return [
         *(text for curve in curves for text in curve),
-        writer.rows("bump_t", "bump", rows, len(curves)),
+        writer.rows("bump_t", "bump", rows),
         writer.array("uint16_t", "bump_of", list(t.bump_of)),
     ]
 
@@ -354,10 +342,7 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
 def _elements(t: FixedElementTables, writer: Writer) -> list[ConstantTable]:
     """The pieces of the curve of elements in parallel with the plays, and the elements."""
     arrays = (("piece_t", "piece", t.piece), ("element_table_t", "element_table", t.element))
-    return [
-        writer.rows(kind, name, [", ".join(members(type(part), row)) for row in part], len(part))
-        for kind, name, part in arrays
-    ]
+    return [writer.rows(kind, name, [members(type(part), row) for row in part]) for kind, name, part in arrays]
 
 
 def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:
@@ -365,18 +350,17 @@ def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:
     behind, own = t.behind, f"behind_{j + 1}"
     if behind.kind[j] == slots.DEAD_ZONE:
         row = members(type(behind.stops), behind.stops[j])
-        return EmittedStage("stops", (writer.block("stops_t", own, row),), f"&hystgen_{own}")
+        return EmittedStage("stops", (writer.entries("stops_t", own, row),), f"&hystgen_{own}")
     curves = [
         _pieces(behind.bends, which, f"{own}_{direction}", writer)
         for which, direction in ((2 * j, "there"), (2 * j + 1, "back"))
     ]
     bends: Bends = behind.bends
-    rows = [
-        f"{_names(curve)},\n     "
-        + entries((*bends.domain[k, :], bends.pieces[k], bends.coefficient.shape[1] - 1, *bends.scaled[k, :]))
-        for k, curve in enumerate(curves, 2 * j)
-    ]
-    arrays = (*(text for curve in curves for text in curve), writer.rows("bend_t", own, rows))
+    both = []
+    for k, curve in enumerate(curves, 2 * j):
+        numbers = *bends.domain[k, :], bends.pieces[k], bends.coefficient.shape[1] - 1, *bends.scaled[k, :]
+        both.append(f"{{{', '.join([*(each.name for each in curve), *map(literal, numbers)])}}}")
+    arrays = (*(text for curve in curves for text in curve), writer.entries("bend_t", own, both))
     return EmittedStage("bend", arrays, f"&hystgen_{own}", ", limited")
 
 

@@ -22,12 +22,9 @@ from hystgen.emission.compensator import (
     Writer,
     drives,
     entries,
-    filled,
-    limits,
     macros,
     macros_of,
     pointers,
-    solves,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -42,18 +39,15 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.moving import MovingTables
     from hystgen.model import Model
 
-COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
-           ("lift", "lift", False))
-"""Fields of the loop engine's tables, the names of their arrays, and whether they are read by more than solutions."""
+COLUMNS = ("threshold", "reciprocal", "weight", "lift")
+"""Arrays of the loop engine's tables."""
 
-DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
-             ("slope", 1, True), ("inverse_slope", 1, False))
-"""Arrays of a dead zone, how many more entries than break points each has, and whether both operators read it."""
+DEAD_ZONE = (("break_x", 0), ("break_y", 0), ("anchor_x", 1), ("anchor_y", 1), ("slope", 1), ("inverse_slope", 1))
+"""Arrays of a dead zone, and how many more entries than break points each has."""
 
 class FloatingForm(Form):
     """Floating point."""
 
-    limited, solved = ("inside",), [field for field, _, both in COLUMNS if not both]
     held = "NaN or infinite input: the last answer was held"
     warning = (
         " Not for targets that flush denormal numbers to zero or do not round to nearest, nor for flags that "
@@ -95,10 +89,10 @@ class FloatingForm(Form):
             envelopes=plays.envelopes or any(one.kind == "envelope" for one in stages),
         )
 
-    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[EmittedStage]:
-        return [_stage(t.behind, j, f"behind_{j + 1}", options, writer) for j in range(len(t.behind.stage_kind))]
+    def behind(self, t: ChainTables, writer: Writer) -> list[EmittedStage]:
+        return [_stage(t.behind, j, f"behind_{j + 1}", writer) for j in range(len(t.behind.stage_kind))]
 
-    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> Tabled:
+    def moving(self, t: ChainTables, writer: Writer) -> Tabled:
         from hystgen.compensator.chain import moving
 
         plays: MovingTables = t.moving
@@ -119,7 +113,7 @@ class FloatingForm(Form):
             ("piece", plays.elements.piece, len(plays.elements.element) > 0),
         ):
             if wanted:
-                arrays.append(writer.rows("real_t", name, map(entries, rows), *rows.shape))
+                arrays.append(writer.matrix("real_t", name, list(rows)))
         if len(plays.elements.element):
             arrays += [
                 writer.array("real_t", f"element_{name}", list(getattr(plays.elements.element, name)))
@@ -152,32 +146,29 @@ def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, floa
 
 def _numbers(t: Tables, model: AnyTables, errors: Errors, options: Options, writer: Writer) -> Numbers:
     """The numbers of a model, or those of the plays in a model with effects; `model`: its tables."""
-    stages = [_stage(t, j, f"stage_{j + 1}", options, writer) for j in range(len(t.stage_kind))]
+    stages = [_stage(t, j, f"stage_{j + 1}", writer) for j in range(len(t.stage_kind))]
     beside = [array for stage in stages for array in stage.arrays]
     if options.engine == "corners":
-        limited = limits(model, options) or options.layout == "shared-runtime"
-        plays = _corner_tables(t, options, writer, front=bool(stages) and model is t, limited=limited)
+        plays = _corner_tables(t, options, writer, front=bool(stages) and model is t)
     else:
-        solved = solves(model, options)
-        plays = _loop_tables(t, solved, writer)
-        read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or solved}
-        places = [read[field] for field in ("threshold", "weight", "lift", "inverse_slope") if field in read]
-        unread = ["NULL"] * (len(COLUMNS) - len(read)) * (options.layout == "shared-runtime")
-        beside = [pointers(t, [*places, *unread], writer), *beside]
+        plays = _loop_tables(t, writer)
+        places = [f"{writer.name}_play.{own}" for own in ("threshold", "weight", "lift", "reciprocal")]
+        beside = [pointers(t, places, writer), *beside]
     return Numbers(
         t, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
         envelopes=any(stage.kind == "envelope" for stage in stages), stages=tuple(stages),
     )
 
 
-def _loop_tables(t: Tables, solved: bool, writer: Writer) -> list[ConstantTable]:
+def _loop_tables(t: Tables, writer: Writer) -> list[ConstantTable]:
     """The loop engine's tables: arrays in one structure, and the start memory."""
-    columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or solved]
+    fields = {"reciprocal": "inverse_slope"}
+    columns = [(own, list(getattr(t, fields.get(own, own)))) for own in COLUMNS]
     start = [writer.array("real_t", "model_start", list(t.start))] * (len(t.start) > 1)
     return [writer.columns("real_t", "play", columns), *start]
 
 
-def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool, limited: bool) -> list[ConstantTable]:
+def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[ConstantTable]:
     """The corner engine's tables, one operator after the other."""
     found = []
     for operator, curve, starts in (
@@ -185,40 +176,32 @@ def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool, lim
         ("inverse", t.inverse, (t.inverse_first, t.inverse_zero)),
     ):
         if operator in options.operators:
-            found += _curve_tables(curve, starts, operator, writer, limited)
+            found += _curve_tables(curve, starts, operator, writer)
             found += [drives(t, (t.applied, t.begin), operator, writer)] * front
     return found
 
 
-def _curve_tables(
-    curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer, limited: bool
-) -> list[ConstantTable]:
+def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer) -> list[ConstantTable]:
     """Segments, curve and start memories of one operator."""
     rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
-    segments = filled(f"{{{entries(row)}}}" for row in rows).splitlines()
-    pairs = [f"{{{entries(pair[:2])}}}" for pair in (curve.limit, *[curve.inside] * limited, curve.range)]
-    found = [
-        writer.lines("segment_t", f"{operator}_segment", segments, len(curve.way)),
-        writer.entries("curve_t", f"{operator}_curve", [f"{writer.name}_{operator}_segment", *pairs]),
-    ]
+    pairs = [f"{{{entries(pair[:2])}}}" for pair in (curve.limit, curve.inside, curve.range)]
+    segments = writer.rows("segment_t", f"{operator}_segment", [list(map(literal, row)) for row in rows])
+    found = [segments, writer.entries("curve_t", f"{operator}_curve", [segments.name, *pairs])]
     before: dict[str, str] = {}
     memories = []
     for start, memory in zip(starts, ("init", "reset"), strict=True):
-        points = [f"{{{entries(point[:2])}}}" for point in start.center]
-        text = points[0] if len(points) == 1 else f"\n{filled(points)}\n"
-        if text not in before:  # plays may start alike after init and after reset
-            before[text] = f"{writer.name}_{operator}_{memory}_center"
-            found.append(writer.line("real_t", f"{operator}_{memory}_center", text, len(points), 2))
+        center = writer.matrix("real_t", f"{operator}_{memory}_center", [point[:2] for point in start.center])
+        content = center.text.partition("=")[2]
+        if content not in before:  # plays may start alike after init and after reset
+            before[content] = center.name
+            found.append(center)
         output, falling, rising = map(literal, start.bottom)
-        memories.append(
-            f"{{{before[text]}, {start.step}, {start.risen}, "
-            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {writer.prefix.upper()}_BOTTOM}}}}"
-        )
-    lines = ",\n".join(filled([memory]) for memory in memories).splitlines()
-    return [*found, writer.lines("start_t", f"{operator}_start", lines, 2)]
+        bottom = f"{{{output}, {{{falling}, {rising}}}, {start.top}, {writer.prefix.upper()}_BOTTOM}}"
+        memories.append([before[content], str(start.step), str(start.risen), bottom])
+    return [*found, writer.rows("start_t", f"{operator}_start", memories)]
 
 
-def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -> EmittedStage:
+def _stage(t: StageTables, j: int, own: str, writer: Writer) -> EmittedStage:
     """A stage of the memoryless part, or of saturation."""
     data = t.stage_data[int(t.stage_first[j]) :]
     if t.stage_kind[j] == slots.TANH:
@@ -226,25 +209,22 @@ def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -
         if not np.array_equal(data[:7], data[7:14]):
             branches = {f"{own}_ascending": data[:7], f"{own}_descending": data[7:14]}
             place = f"ascending ? &hystgen_{own}_ascending : &hystgen_{own}_descending"
-        words = "/* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */\n"
+        words = "/* a0 tanh(a1 x + a2) + a3 */\n"
         arrays = [
-            writer.lines("envelope_t", branch, filled(map(literal, row)).splitlines(), words=words)
-            for branch, row in branches.items()
+            writer.entries("envelope_t", branch, list(map(literal, row)), words) for branch, row in branches.items()
         ]
         return EmittedStage("envelope", tuple(arrays), place, ", limited")
     n, first = int(t.stage_size[j]), 0
     arrays, places = [], []
-    for part, more, both in DEAD_ZONE:
+    for part, more in DEAD_ZONE:
         values = list(data[first : first + n + more])
         first += n + more
-        if values and (both or options.inverse):
+        if values:
             arrays.append(writer.array("real_t", f"{own}_{part}", values))
-            places.append(arrays[-1].name)
-        else:
-            places.append("NULL")
+        places.append(arrays[-1].name if values else "NULL")
     words = "/* the straight pieces of the dead-zone sum */\n"
-    lines = filled([*places, str(n)]).splitlines()
-    return EmittedStage("dead_zone", (*arrays, writer.lines("dead_zone_t", own, lines, words=words)), f"&hystgen_{own}")
+    zone = writer.entries("dead_zone_t", own, [*places, str(n)], words)
+    return EmittedStage("dead_zone", (*arrays, zone), f"&hystgen_{own}")
 
 
 FORM = FloatingForm()

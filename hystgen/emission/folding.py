@@ -12,6 +12,7 @@ import functools
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
@@ -66,6 +67,11 @@ class Function:
         """The body on one line, without marks of unused parameters."""
         return " ".join(_COMMENT.sub("", _MARK.sub("", self.body)).split())
 
+    @property
+    def code(self) -> str:
+        """Its parameters and its body."""
+        return f"{', '.join(self.parameters)}\n{self.body}"
+
     def text(self) -> str:
         """Its C."""
         return f"{self.above}{self.before}{self.name}({', '.join(self.parameters)}) {{\n{self.body}}}\n"
@@ -83,9 +89,108 @@ def parsed(text: str) -> Function | None:
     return Function(above, re.sub(r"\s+", " ", found["before"]), found["name"], tuple(parameters.split(", ")), body)
 
 
+Member: TypeAlias = tuple[str, str]
+"""A structure's name without prefix, and one of its members; the first is empty if the structure is not known."""
+
+_DECLARED = re.compile(r"\bhystgen_(\w+)\s+(?:\*\s*(?:const\s+)?)?(\w+)")
+_FIRST = re.compile(r"(?<![\w.>])[A-Za-z_]\w*(?=\[|->|\.)")
+_STEP = re.compile(r"(?:->|\.)(\w+)|\[(?:[^\[\]]|\[[^\[\]]*\])*\]")
+_PATH = r"\w+(?:(?:->|\.)\w+|\[[^\]]*\])*(?:->|\.)\w+(?:\[[^\]]*\])?"
+_STORE = re.compile(rf"^ *(?P<path>{_PATH}) [-+*|&^]?= (?P<value>[^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+PLAIN = re.compile(r"[\w.>[\]-]+").fullmatch
+"""Tells whether a value is a number, a name or a member."""
+
+
+class Store(NamedTuple):
+    """A statement that only sets a member; `reads`: the members in its value."""
+
+    text: str
+    target: Member
+    value: str
+    reads: frozenset[Member]
+
+
+class Members:
+    """The members of structures; `types`: the type of each member, by structures' names without prefix; `whole`:
+    structures from which nothing is left out; `objects`: structures of objects that functions name."""
+
+    def __init__(
+        self, types: Mapping[str, Mapping[str, str]], whole: Collection[str], objects: Mapping[str, str]
+    ) -> None:
+        self.types, self.whole, self._objects = types, whole, objects
+        self._found: dict[str, tuple[frozenset[Member], list[Store]]] = {}
+
+    def _paths(self, code: str, known: Mapping[str, str]) -> Iterator[list[Member]]:
+        """The members along each expression that leads to one."""
+        for found in _FIRST.finditer(code):
+            kind, at, path = known.get(found[0], ""), found.end(), list[Member]()
+            while step := _STEP.match(code, at):
+                at = step.end()
+                if name := step[1]:
+                    path.append((kind, name))
+                    kind = self.types.get(kind, {}).get(name, "").replace("const ", "").rstrip(" (*")
+                    kind = kind.removeprefix("hystgen_")
+            yield path
+
+    def _uses(self, code: str) -> tuple[frozenset[Member], list[Store]]:
+        """The members in a function's code outside stores, and its stores."""
+        if code not in self._found:
+            known = {**self._objects, **{name: kind for kind, name in _DECLARED.findall(code)}}
+            stores, rest = [], code
+            for found in _STORE.finditer(code):
+                path, *beside = self._paths(found["path"], known)
+                kind, name = path[-1]
+                if "*" in self.types.get(kind, {}).get(name, "") and found["path"].endswith("]"):
+                    continue  # to what the member points to
+                reads = {each for other in (path[:-1], *beside, *self._paths(found["value"], known)) for each in other}
+                stores.append(Store(found[0], path[-1], found["value"], frozenset(reads)))
+                rest = rest.replace(found[0], "", 1)
+            self._found[code] = frozenset(each for path in self._paths(rest, known) for each in path), stores
+        return self._found[code]
+
+    def stores(self, code: str) -> list[Store]:
+        """The stores of a function."""
+        return self._uses(code)[1]
+
+    def read(self, codes: Iterable[str], looks: Callable[[str], object]) -> set[Member]:
+        """The members whose values functions use, other than to store members that nothing reads; `looks`: whether a
+        value may be left out."""
+        found: set[Member] = set()
+        stores = list[Store]()
+        for code in codes:
+            rest, stored = self._uses(code)
+            found |= rest
+            stores += stored
+        found |= {each for store in stores if not looks(store.value) for each in (store.target, *store.reads)}
+        while more := {each for store in stores if self.used(store.target, found) for each in store.reads} - found:
+            found |= more
+        return found
+
+    def named(self, codes: Iterable[str]) -> set[Member]:
+        """The members that functions name, whether they read them or not."""
+        found = set[Member]()
+        for code in codes:
+            rest, stored = self._uses(code)
+            found |= rest.union(*({each.target} | each.reads for each in stored))
+        return found
+
+    def used(self, member: Member, among: Collection[Member]) -> bool:
+        """Whether a member is among these, or may be, or stays anyhow."""
+        kind, name = member
+        return kind not in self.types or kind in self.whole or member in among or ("", name) in among
+
+    def without_stores(self, text: str, read: Collection[Member]) -> str:
+        """A function's text without stores of plain values to members that are not read."""
+        for store in self.stores(text):
+            if PLAIN(store.value) and not self.used(store.target, read):
+                text = text.replace(store.text, "", 1)
+        return text
+
+
 def folded(
     functions: Iterable[Function], kernels: Iterable[Function],
-    wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], meaning: Callable[[str], str] = str,
+    wanted: Callable[[dict[str, Function]], Collection[str]], apart: Sequence[str], members: Members,
+    meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
     """The functions of a model without code that does nothing; `wanted`: names of those still called; other arguments
     as for `_Folding`."""
@@ -98,7 +203,7 @@ def folded(
     masked = [
         replace(each, above=_COMMENT.sub(mask, each.above), body=_COMMENT.sub(mask, each.body)) for each in functions
     ]
-    folding = _Folding(masked, list(kernels), comments, apart, meaning)
+    folding = _Folding(masked, list(kernels), comments, apart, members, meaning)
     while folding.once():
         kept = wanted(folding.functions)
         folding.functions = {name: each for name, each in folding.functions.items() if name in kept}
@@ -115,15 +220,16 @@ def folded(
 class _Folding:
     """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged;
     `comments`: texts of the comments, for which numbers stand; `apart`: first words of functions that are not inlined
-    here, to save stack; `meaning`: of a type name, since several can denote the same type here."""
+    here, to save stack; `members`: of structures that no kernel uses; `meaning`: of a type name, since several can
+    denote the same type here."""
 
     def __init__(
         self, functions: Sequence[Function], kernels: Sequence[Function], comments: list[str],
-        apart: Sequence[str], meaning: Callable[[str], str],
+        apart: Sequence[str], members: Members, meaning: Callable[[str], str],
     ) -> None:
         self.functions = {each.name: each for each in functions}
         self._known = {each.name: each for each in kernels}
-        self._comments, self._apart, self._meaning = comments, tuple(apart), meaning
+        self._comments, self._apart, self._members, self._meaning = comments, tuple(apart), members, meaning
 
     def once(self) -> bool:
         """Do one round. Returns whether anything changed."""
@@ -133,8 +239,7 @@ class _Folding:
         for name in sorted(self.functions, key=lambda each: len(self.functions[each].statements)):
             self._fold(self.functions[name])
         self._decided()
-        for operator in ("forward", "inverse"):
-            self._unread_fields(operator)
+        self._unread_members()
         if self.functions == before:
             self._splice()
         return self.functions != before
@@ -380,28 +485,26 @@ class _Folding:
                 return re.sub(rf"(?<![.>\w]){copy}\b", of, rest)
         return body
 
-    def _unread_fields(self, operator: str) -> None:
-        """Remove fields that are never read, and those that are only ever set to false."""
-        mine = {name: each for name, each in self.functions.items() if each.operator == operator}
-        reads: dict[str, set[str]] = {}
-        read: set[str] = set()
-        values: dict[str, set[str]] = {}
-        for function in mine.values():
-            for found in _STORE.finditer(function.body):
-                values.setdefault(found[1], set()).add(found[2])
-                reads.setdefault(found[1], set()).update(re.findall(r"self->(\w+)", found[2]))
-            read.update(re.findall(r"self->(\w+)", _STORE.sub("", function.body)))
-        while more := {each for field in read for each in reads.get(field, ())} - read:
-            read |= more
-        addressed = {each for function in mine.values() for each in re.findall(r"&self->(\w+)", function.body)}
-        asked = {each for function in mine.values() for each in re.findall(_ASKED, function.body)}
-        false = {field for field in asked if values.get(field, set()) <= {"false"}} - addressed
-        for name, function in mine.items():
+    def _unread_members(self) -> None:
+        """Remove members that are never read, and flags of an instance that are only ever set to false."""
+        read = self._members.read([each.code for each in self.functions.values()], self._looks)
+        values: dict[Member, set[str]] = {}
+        for function in self.functions.values():
+            for store in self._members.stores(function.code):
+                values.setdefault(store.target, set()).add(store.value)
+        mine = [each for each in self.functions.values() if each.operator]
+        addressed, asked = (
+            {(f"{each.operator}_t", field) for each in mine for field in re.findall(form, each.body)}
+            for form in (r"&self->(\w+)", _ASKED)
+        )
+        false = {each for each in asked if values.get(each, set()) <= {"false"}} - addressed
+        for name, function in list(self.functions.items()):
             body = function.body
-            for found in _STORE.finditer(function.body):
-                if (found[1] not in read or found[1] in false) and self._looks(found[2]):
-                    body = body.replace(found[0], "", 1)
-            for field in false:
+            for store in self._members.stores(function.code):
+                idle = store.target in false or not self._members.used(store.target, read)
+                if idle and self._looks(store.value):
+                    body = body.replace(store.text, "", 1)
+            for field in (field for kind, field in false if kind == f"{function.operator}_t"):
                 body = re.sub(rf"^ *[\w>-]+ \|= self->{field} \? \w+ : 0u;\n", "", body, flags=re.MULTILINE)
                 body = body.replace(f"if (self->{field})", "if (false)")
             if body != function.body:
@@ -416,7 +519,6 @@ def _declared(function: Function) -> dict[str, str]:
 
 _ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"
 """A field that is a condition by itself."""
-_STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 
 
 def _unmarked(body: str, gone: Collection[str]) -> str:
@@ -527,9 +629,3 @@ _LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 def _choices(body: str) -> str:
     """The body without choices between equal values."""
     return re.sub(r"[\w>-]+ \? ([^?:;]+?)\s+: \1(?=[;,)])", r"\1", body)
-
-
-def fields(functions: Collection[Function], operator: str) -> frozenset[str]:
-    """The fields of an instance that its functions use."""
-    mine = [each.body for each in functions if each.operator == operator]
-    return frozenset(field for body in mine for field in re.findall(r"self->(\w+)", body))

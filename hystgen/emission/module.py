@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Names, Numbers, Writer
 from hystgen.emission.cost import Cost, Data
+from hystgen.emission.folding import PLAIN, Members
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
 from hystgen.emission.text import define, fit
@@ -37,7 +38,7 @@ def compensator(model: Model, options: Options) -> EmittedModel:
     writer = Writer(model.name, names.rt)
     glue: Glue | None = None
     if compiled:
-        behind = form.behind(compiled.tables, options, writer)
+        behind = form.behind(compiled.tables, writer)
         blocks = chain.ChainBlocks.of(compiled.tables, options.operators)
         effects = chain.effects(compiled.tables, blocks, form, writer.own)
         numbers = form.chained(model, compiled, effects, behind, options, writer)
@@ -99,47 +100,46 @@ def front(one: EmittedModel) -> str:
 
 def composed(one: EmittedModel) -> Code:
     """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
-    family, names, operators = one.family, one.names, one.options.operators
+    family, names, operators, numbers = one.family, one.names, one.options.operators, one.numbers
+    shared = one.options.layout == "shared-runtime"
     blocks: list[runtime.Piece] = []
-    own_functions: list[runtime.Piece] = []
+    given, given_functions = list[runtime.Piece](), list[runtime.Piece]()
     if one.compiled:
         from hystgen.emission import declarations, own
 
-        own_types, own_functions = own.pieces(one.compiled.tables)
-        blocks = [*declarations.pieces(family.kind), *own_types]
-    pieces = runtime.operator_pieces(one.variant, operators, front(one), one.calls, own_functions)
-    called = sorted(runtime.used(pieces))
-    shared = one.options.layout == "shared-runtime"
+        given, given_functions = own.pieces(one.compiled.tables)
+        blocks = list(declarations.pieces(family.kind))
+    instances = [*one.glue.states.values()] if one.glue else runtime.state_pieces(one.variant, family, operators)
     memory, of_tables = runtime.memory_pieces(family), runtime.table_pieces(family)
-    kernels = runtime.kernel_pieces(family, one.kernel_facts)
-    if not shared:
-        kernels = runtime.needed(kernels, called)
-        of_tables = [
-            runtime.with_fields(each, {own.name for own in each.members} - {*one.unread.get(each.name, ())})
-            for each in of_tables
-        ]
-    named = runtime.named_fields([*pieces, *kernels])
-    pieces = runtime.without_unread(pieces, named)
-    if not shared:
-        kernels = runtime.without_unread(kernels, named)
-        memory = runtime.without_unread(memory, named, runtime.needed(memory, runtime.used(of_tables)))
+    pieces = runtime.operator_pieces(
+        one.variant, operators, front(one), one.calls, given_functions, [*blocks, *instances]
+    )
+    kernels = runtime.needed(runtime.kernel_pieces(family, one.kernel_facts), sorted(runtime.used(pieces)))
+    whole = [*given, *([*memory, *of_tables] if shared else runtime.needed(memory, runtime.used(of_tables)))]
+    written = {each.name: each for each in (*numbers.plays, *numbers.beside)}
+    members = runtime.members_of(
+        [*memory, *of_tables, *blocks, *given, *instances, *pieces], whole,
+        {name: each.kind for own, each in written.items() for name in (own, f"hystgen{own.removeprefix(names.name)}")},
+    )
+    read = members.read([each.code for each in (*pieces, *kernels)], PLAIN)
+    pieces = runtime.without_unread(pieces, members, read)
+    kernels = runtime.without_unread(kernels, members, read)
+    named = members.named([each.code for each in (*pieces, *kernels)])
+    memory, of_tables, own_types, pieces = (
+        runtime.with_named(each, members, named) for each in (memory, of_tables, [*blocks, *given, *instances], pieces)
+    )
+    called = sorted(runtime.used(pieces))
     kernels = runtime.needed([*of_tables, *kernels], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
-    numbers = one.numbers
-    tabled = _named(text, [*numbers.plays, *numbers.beside])
-    plays, beside = ([each for each in every if each.name in tabled] for every in (numbers.plays, numbers.beside))
+    used = _tables(written, names.name, members, [each.code for each in (*pieces, *kernels)])
+    plays, beside = (
+        [used[each.name] for each in every if each.name in used] for every in (numbers.plays, numbers.beside)
+    )
     contents = [each for table in (*plays, *beside) for each in table.contents]
-    tables: list[runtime.Piece] = []
-    if one.glue:
-        glue = one.glue.named({op: runtime.fields(pieces, op) for op in operators})
-        types = [*blocks, *glue.states.values()]
-        kinds = [f"hystgen_{kind}" for kind, _ in contents]
-        types = runtime.without_unread(types, named, runtime.needed(types, kinds))
-        states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
-        tables = [piece for piece in runtime.needed(types, [*called, *kinds]) if piece not in states]
-    else:
-        states = runtime.state_pieces(one.variant, family, operators, pieces)
+    states = runtime.needed(own_types, [f"hystgen_{op}_t" for op in operators])
+    kinds = [f"hystgen_{kind}" for kind, _ in contents]
+    tables = [piece for piece in runtime.needed(own_types, [*called, *kinds]) if piece not in states]
     shown = runtime.render_operators(states, names.name, one.corners, names.rt, family)
     if one.corners and not shared:
         shown = f"{runtime.all_types(memory, names.rt, family)}\n{shown}"
@@ -162,13 +162,18 @@ def composed(one: EmittedModel) -> Code:
     )
 
 
-def _named(operators: str, every: Sequence[ConstantTable]) -> Collection[str]:
-    """The tables that functions use, directly or through another table."""
-    named = set(re.findall(r"\w+", operators))
-    for table in reversed(every):  # a table comes before those that name it
-        if table.name in named:
-            named |= set(re.findall(r"\w+", table.text))
-    return named
+def _tables(
+    every: Mapping[str, ConstantTable], name: str, members: Members, codes: Sequence[str]
+) -> dict[str, ConstantTable]:
+    """The tables that functions use, directly or through another table, with only the members that these name."""
+    named, words = members.named(codes), set(re.findall(r"\w+", " ".join(codes)))
+    found = {}
+    for own, table in reversed([*every.items()]):  # a table comes before those that name it
+        if {own, f"hystgen{own.removeprefix(name)}"} & words:
+            found[own] = table.keeping(members.types.get(table.kind, {}), named, members.whole)
+            words.update(re.findall(r"\w+", found[own].text))
+            named |= members.named([found[own].text])
+    return found
 
 
 def implementation(one: EmittedModel, code: Code) -> str:

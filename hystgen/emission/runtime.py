@@ -20,6 +20,7 @@ import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
 from hystgen.emission import folding
+from hystgen.emission.folding import Member, Members
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
 """Macros that state facts about a model. Conditions on them are decided at emission; others stay in the C."""
@@ -304,8 +305,7 @@ class Variant:
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
         files = ["compensator/clamp.c"]
-        if not self.chain:
-            files += self.family.codes
+        files += self.family.codes
         files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         return (*files, "compensator/drive.c", *own, "compensator/status.c")
@@ -377,16 +377,19 @@ LANGUAGE = {
 @dataclass(frozen=True)
 class Field:
     """A member of a structure. Its type is one of the run time's, without prefix, a standard one or a pointer; an array
-    has a `length` as written in C; `bits`: the width of a bit field."""
+    has a `length` as written in C; `bits`: the width of a bit field; `written`: its line, if it stands in a file."""
 
     kind: str
     name: str
     comment: str = ""
     length: str = ""
     bits: int = 0
+    written: str = ""
 
     def text(self) -> str:
-        """Its declaration in C, if it is not a bit field."""
+        """Its declaration in C."""
+        if self.written:
+            return self.written
         kind = self.kind if "*" in self.kind else f"{self.kind} " if self.kind in LANGUAGE else f"hystgen_{self.kind} "
         size = f"[{self.length}]" if self.length else ""
         return f"{kind}{self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
@@ -394,30 +397,17 @@ class Field:
 
 @dataclass(frozen=True)
 class Piece:
-    """A top-level piece of C with the comment above it; `declared`: the members of a structure, if it is written from
-    them."""
+    """A top-level piece of C with the comment above it; `members`: if it is a structure."""
 
     name: str
     text: str
     uses: frozenset[str]
-    declared: tuple[Field, ...] = ()
+    members: tuple[Field, ...] = ()
 
-    @property
+    @functools.cached_property
     def code(self) -> str:
         """Its text without comments."""
         return _COMMENT.sub("", self.text)
-
-    @property
-    def members(self) -> tuple[Field, ...]:
-        """The members that it declares, if it is a structure."""
-        head, _, body = self.code.partition("{")
-        if self.declared or "typedef struct" not in head:
-            return self.declared
-        found = (_MEMBER.match(" ".join(each.split())) for each in body.rpartition("}")[0].split(";")[:-1])
-        return tuple(
-            Field(one[1].rstrip().removeprefix("hystgen_"), one[2], "", one[3] or "", int(one[4] or 0))
-            for one in found if one
-        )
 
     @property
     def contents(self) -> tuple[tuple[str, int], ...]:
@@ -427,7 +417,9 @@ class Piece:
 
 
 _MEMBER = re.compile(
-    r"((?:const )?(?:hystgen_)?(?:unsigned int|\w+)(?: \(?\*)?) ?(\w+)\)?(?:\[([^\]]+)\])?(?: : (\d+))?$"
+    r"^ *((?:const )?(?:hystgen_)?(?:unsigned int|\w+)(?: \(?\*)?) ?(\w+)\)?(?:\[([^\]]+)\])?(?: : (\d+))?;"
+    r"(?: */\*.*?\*/)?\n",
+    re.MULTILINE | re.DOTALL,
 )
 _CONSTANT = re.compile(r"^static const (?:hystgen_)?(\w+) \w+((?:\[\d+\])*) = ", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
@@ -522,6 +514,8 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
 def forms(source: str, facts: Collection[str]) -> list[str]:
     """The text of a file with its conditions on facts resolved, once for each operator if it serves both. The argument
     `operator_x` is then named as in that operator's step."""
+    moved = APART if "HYSTGEN_HAS_MOVES_APART" in facts else "static inline "
+    source = source.replace("HYSTGEN_APART_IF_MOVED ", moved)
     if "hystgen_operator_" not in source:
         return [chosen(source, facts)]
     return [
@@ -564,10 +558,11 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]], own: Sequence[Piece]
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]], own: Sequence[Piece],
+    types: Iterable[Piece],
 ) -> list[Piece]:
     """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
-    `api`; `own`: functions of a user's own blocks, which stay unchanged."""
+    `api`; `own`: functions of a user's own blocks, which stay unchanged; `types`: those that no kernel uses."""
     family = variant.family
     blocks = family.chain_blocks if variant.chain else ()
     roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
@@ -586,28 +581,28 @@ def operator_pieces(
 
     functions = folding.folded(
         [each for _, each in parsed if each], kernels, lambda functions: {each.name for each in put(functions)},
-        variant.apart, lambda kind: family.meaning(kind.removeprefix("hystgen_")),
+        variant.apart, members_of([*types, *pieces]), lambda kind: family.meaning(kind.removeprefix("hystgen_")),
     )
     return put(functions)
-
-
-def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
-    """The fields of an operator's instance that these functions use."""
-    return folding.fields([found for piece in pieces if (found := folding.parsed(piece.text))], operator)
 
 
 def declared_type(name: str, comment: str, fields: Iterable[Field]) -> Piece:
     """A structure in C."""
     members = tuple(fields)
     body = "\n".join(f"    {each.text()}" for each in members)
-    return replace(piece_of(f"{comment}\ntypedef struct {{\n{body}\n}} hystgen_{name};\n"), declared=members)
+    return replace(piece_of(f"{comment}\ntypedef struct {{\n{body}\n}} hystgen_{name};\n"), members=members)
 
 
 def piece_of(text: str) -> Piece:
     """The piece with this text."""
     code = _COMMENT.sub("", text)
     own = _defined_name(code)
-    return Piece(own, text, frozenset(_NAME.findall(code)) - {own})
+    found = _MEMBER.finditer(text[text.index("{\n") + 2 :]) if "typedef struct" in code else ()
+    members = (
+        Field(each[1].rstrip().removeprefix("hystgen_"), each[2], "", each[3] or "", int(each[4] or 0), each[0].strip())
+        for each in found
+    )
+    return Piece(own, text, frozenset(_NAME.findall(code)) - {own}, tuple(members))
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
@@ -618,47 +613,46 @@ def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 
 
-def state_pieces(variant: Variant, family: Family, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
-    """The types of instances, with the fields that these functions use."""
-    made = []
-    for op in operators:
-        named = fields(functions, op)
-        for piece in needed(_pieces([CORNER_STATE], family.facts | variant.facts), [f"hystgen_{op}_t"]):
-            made.append(with_fields(piece, named))
-    return made
+def state_pieces(variant: Variant, family: Family, operators: Iterable[str]) -> list[Piece]:
+    """The types of instances."""
+    every = _pieces([CORNER_STATE], family.facts | variant.facts)
+    return needed(every, [f"hystgen_{op}_t" for op in operators])
 
 
-_FIELD = re.compile(r"^    [\w *]+?(\w+)(?:\[.*\])?;")
-_STORE = re.compile(
-    r"^ *(?P<of>\w+(?:(?:->|\.)\w+)*)(?:->|\.)(?P<field>\w+) = (?P<value>[\w.>[\]-]+);(?: */\*[^\n]*?\*/)?\n",
-    re.MULTILINE,
-)
+def with_members(piece: Piece, kept: Iterable[Field]) -> Piece:
+    """A structure with only these members."""
+    comment = piece.text[: piece.text.index("typedef struct")].rstrip()
+    return declared_type(_own_name(piece), comment, kept)
 
 
-def with_fields(piece: Piece, names: Collection[str]) -> Piece:
-    """A structure with only the fields of these names."""
-    lines = piece.text.splitlines(keepends=True)
-    text = "".join(line for line in lines if not (found := _FIELD.match(line)) or found[1] in names)
-    return replace(piece_of(text), declared=tuple(each for each in piece.declared if each.name in names))
+def members_of(
+    types: Iterable[Piece], whole: Iterable[Piece] = (), objects: Mapping[str, str] | None = None
+) -> Members:
+    """The members of the structures among these pieces; `whole`: those that keep all; `objects`: as in `Members`."""
+    found = {_own_name(each): {field.name: field.kind for field in each.members} for each in types if each.members}
+    return Members(found, frozenset(map(_own_name, whole)), objects or {})
 
 
-def named_fields(functions: Iterable[Piece]) -> frozenset[str]:
-    """The names of all fields of which functions do more than set them to a plain value."""
-    texts = (_STORE.sub(r"\g<of> \g<value>\n", each.code) for each in functions)
-    return frozenset(field for text in texts for field in re.findall(r"(?:->|\.)(\w+)", text))
+def _own_name(piece: Piece) -> str:
+    return piece.name.removeprefix("hystgen_")
 
 
-def without_unread(pieces: Iterable[Piece], named: Collection[str], whole: Collection[Piece] = ()) -> list[Piece]:
-    """Functions and types without fields that are not `named`; types in `whole`, those of constants, keep theirs."""
-
-    def stored(found: re.Match[str]) -> str:
-        return found[0] if found["field"] in named else ""
-
+def without_unread(pieces: Iterable[Piece], members: Members, read: Collection[Member]) -> list[Piece]:
+    """Functions without stores of plain values to members that are not read."""
     return [
-        piece if piece in whole else with_fields(piece, named) if piece.members
-        else piece_of(text) if (text := _STORE.sub(stored, piece.text)) != piece.text else piece
-        for piece in pieces
+        piece_of(text) if (text := members.without_stores(each.text, read)) != each.text else each for each in pieces
     ]
+
+
+def with_named(pieces: Iterable[Piece], members: Members, named: Collection[Member]) -> list[Piece]:
+    """The pieces, structures with only the members that functions name; none without a member."""
+    made = []
+    for each in pieces:
+        own = _own_name(each)
+        kept = [field for field in each.members if own in members.whole or members.used((own, field.name), named)]
+        if kept or not each.members:
+            made.append(each if len(kept) == len(each.members) else with_members(each, kept))
+    return made
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:

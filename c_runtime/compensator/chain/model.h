@@ -110,62 +110,6 @@ extern const hystgen_factor_t hystgen_waited[1];
 extern const hystgen_lag_table_t hystgen_braked_1;
 extern const hystgen_ageing_table_t hystgen_ageing_1;
 
-/* Either operator: the fields of both. */
-typedef struct {
-    hystgen_real_t pending;
-    hystgen_real_t applied;
-    hystgen_ramp_t reached;
-    hystgen_fine_t drive;
-    hystgen_real_t reference;
-    hystgen_real_t last;
-    hystgen_signal_t level;
-    hystgen_signal_t output;
-    hystgen_real_t answer;
-    hystgen_signal_t offset;
-    hystgen_braked_t braked_1;
-    hystgen_ageing_t ageing_1;
-    hystgen_steady_t steady;
-    hystgen_quiet_t quiet;
-    hystgen_signal_t line[HYSTGEN_TAPS];
-    hystgen_real_t waiting[HYSTGEN_WAITING];
-    unsigned int oldest;
-    bool ascending;
-    bool moving;
-    bool has_pending;
-    bool repeated;
-    bool stepped;
-    bool filled;
-    unsigned int bits;
-    unsigned int status;
-#ifndef HYSTGEN_HAS_CORNERS
-    hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
-    hystgen_sum_t bent[HYSTGEN_N_PLAYS];
-    hystgen_sum_t staying;
-    unsigned int released;
-    hystgen_play_t turned;
-    bool upward;
-    hystgen_play_t found;
-    hystgen_signal_t asked;
-    hystgen_play_t near;
-    hystgen_sum_t joined;
-    hystgen_sum_t slope;
-    hystgen_sum_t steep;
-    bool departs;
-    hystgen_element_t element[HYSTGEN_ELEMENTS];
-    hystgen_search_t search;
-#else
-    bool sought;
-#ifdef HYSTGEN_FIXED
-    hystgen_place_t here;
-    hystgen_signal_t next;
-    hystgen_kink_t kink;
-#else
-    hystgen_plays_t plays;
-    hystgen_place_t undo;
-#endif
-    hystgen_corner_t corner[HYSTGEN_CORNERS];
-#endif
-} hystgen_operator_t;
 typedef hystgen_operator_t hystgen_forward_t;
 typedef hystgen_operator_t hystgen_inverse_t;
 

@@ -132,13 +132,8 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
 /* Play i after the input of the plays has moved from x to w. Not inlined where this saves
    stack. */
-#ifdef HYSTGEN_HAS_MOVES_APART
-HYSTGEN_APART
-#else
-static inline
-#endif
-hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play, hystgen_play_t x,
-                               hystgen_play_t w) {
+HYSTGEN_APART_IF_MOVED hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
+                                                      hystgen_play_t x, hystgen_play_t w) {
     return hystgen_moved(i, play, x, w);
 }
 

@@ -200,12 +200,8 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hys
 }
 #else
 /* Adds play i, which moves, to the sum at the input tried, and to the sum's slope. */
-#ifdef HYSTGEN_HAS_MOVES_APART
-HYSTGEN_APART
-#else
-static inline
-#endif
-void hystgen_inverse_add(hystgen_attempt_t *at, unsigned int i, hystgen_real_t bump) {
+HYSTGEN_APART_IF_MOVED void hystgen_inverse_add(hystgen_attempt_t *at, unsigned int i,
+                                                hystgen_real_t bump) {
     hystgen_real_t change;
     const hystgen_real_t value = hystgen_bent_steep(i, at->reached, bump, &change);
     const hystgen_real_t weight = hystgen_model_tables.weight[i];

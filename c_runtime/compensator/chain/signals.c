@@ -6,9 +6,10 @@
 #define HYSTGEN_CHAIN_SIGNALS_C
 #include "compensator/chain/model.h"
 #include "compensator/clamp.c"
-#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
+#ifdef HYSTGEN_FIXED
+#ifdef HYSTGEN_CHAIN
 #include "arithmetic/factors.c"
-#elif defined(HYSTGEN_FIXED)
+#endif
 #include "compensator/code.c"
 #endif
 
@@ -56,17 +57,7 @@ static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
 
 /* Output code of a signal, limited to the type. */
 static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *status) {
-    const hystgen_signal_t code = hystgen_nearest(y, HYSTGEN_LEVEL_BITS);
-    if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) {
-        *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-    }
-    if (code > HYSTGEN_CODE_MAX) {
-        return (hystgen_real_t)HYSTGEN_CODE_MAX;
-    }
-    if (code < -HYSTGEN_CODE_MAX) {
-        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
-    }
-    return (hystgen_real_t)code;
+    return hystgen_limited_code(hystgen_nearest(y, HYSTGEN_LEVEL_BITS), status);
 }
 
 /* A share of x. The largest code stands for the share just below 1. */

@@ -520,4 +520,68 @@ typedef struct {
 
 #endif
 
+#if defined(HYSTGEN_N_PLAYS) && !defined(HYSTGEN_CONFIGURED)
+/* Either operator: the members of both. */
+typedef struct {
+    hystgen_braked_t braked_1;
+    hystgen_ageing_t ageing_1;
+    hystgen_real_t waiting[3]; /* drives */
+    unsigned int oldest;       /* drive */
+    hystgen_real_t pending;    /* drive sent but not yet in the memory */
+    hystgen_real_t applied;    /* last applied drive */
+    hystgen_ramp_t reached;    /* drive at a limited rate */
+    hystgen_fine_t drive;      /* last output of the drive side */
+    hystgen_real_t reference;  /* of the last step */
+    hystgen_real_t last;     /* the same, limited: the next reference moves up or down from here */
+    hystgen_signal_t level;  /* sum of the plays */
+    hystgen_signal_t output; /* last output of the output side */
+    hystgen_real_t answer;   /* last returned displacement */
+    hystgen_signal_t offset; /* set in addition to the model's */
+    hystgen_quiet_t quiet;
+    hystgen_steady_t steady;
+    hystgen_signal_t line[3]; /* references, the newest last */
+    bool ascending;           /* direction of the drive's last move */
+    bool moving;              /* a drive has been applied */
+    bool has_pending;
+    bool repeated;     /* the last returned drive is still valid for `reference` */
+    bool stepped;      /* a step has returned a drive */
+    bool filled;       /* the line holds references */
+    unsigned int bits; /* of the last step */
+    unsigned int status;
+#ifdef HYSTGEN_HAS_CORNERS
+    bool sought; /* a solution has been found since the plays last followed */
+#ifdef HYSTGEN_FIXED
+    hystgen_place_t here;
+    hystgen_signal_t next; /* output, along the move, at which another play begins to follow */
+    hystgen_kink_t kink;   /* of the present step; kept here rather than on the stack */
+    hystgen_corner_t corner[6];
+#else
+    hystgen_plays_t plays;
+    hystgen_place_t undo; /* place of the plays before the solution */
+    hystgen_corner_t corner[7];
+#endif
+#else
+    hystgen_signal_t bent[HYSTGEN_N_PLAYS]; /* contribution of each play */
+    hystgen_search_t search;                /* for the input of the plays */
+    hystgen_play_t
+        play[13]; /* play 0 is the input of the plays; the rounding remainder of each follows */
+    hystgen_signal_t staying; /* sum of the plays that have not moved lately */
+    unsigned int released;    /* the last of the plays that have */
+    hystgen_play_t turned; /* input of the elements in parallel with the plays at their last turn */
+    bool upward;           /* their input has risen since */
+    hystgen_element_t element[2];
+#ifdef HYSTGEN_FIXED
+    hystgen_play_t near;  /* input for which the sum of the elements was last computed, */
+    hystgen_sum_t joined; /* that sum, */
+    hystgen_sum_t slope;  /* its slope, and whether */
+    bool departs;         /* they have turned there */
+    hystgen_sum_t steep;  /* slope that the rate of a search has, or -1 after a turn */
+#else
+    hystgen_play_t found;   /* input to which a search has led, */
+    hystgen_signal_t asked; /* and the sum of the plays there */
+#endif
+#endif
+} hystgen_operator_t;
+#endif
+
 #endif

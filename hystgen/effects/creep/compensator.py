@@ -28,14 +28,19 @@ def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
         )
 
 
-RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
+class CreepStates(Struct):
+    """States of creep in double precision, as in `CreepNumbers`: 1 - E, c b0, c b1 and c of each."""
+
+    rate: Real
+    early: Real
+    late: Real
+    weight: Real
 
 
 @dataclass(frozen=True)
 class CreepNumbers(One):
     """Constants of a block `y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)` at even steps, in
-    double precision: d is the fraction of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4), of each
-    state: 1 - E, c b0, c b1, c.
+    double precision: d is the fraction of a step that arrives at once, c_i >= 0 the weights.
 
     The inverse, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`, is stable for d > 0 and any time
     constants, since the response is strictly positive real.
@@ -43,7 +48,7 @@ class CreepNumbers(One):
 
     slope: float  # d + sum c_i b1_i
     rest: float  # d + sum c_i
-    terms: Array
+    terms: CreepStates
 
     def at_rest(self, x: float) -> float:
         """The settled output for an input."""
@@ -62,13 +67,13 @@ class CreepNumbers(One):
     @property
     def backward(self) -> float:
         """Largest gain of the inverse through all states."""
-        total, late = float(np.sum(self.terms[:, WEIGHT])), float(np.sum(self.terms[:, LATE]))
+        total, late = float(np.sum(self.terms.weight)), float(np.sum(self.terms.late))
         around = self.rest - 2.0 * total + 2.0 * late
         return 1.0 / around if around > 0.0 else 2.0 / self.slope - 1.0 / self.rest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
         """Rounding errors of the output for inputs up to `size`, and of the inverse itself."""
-        rate, weight = self.terms[:, RATE], self.terms[:, WEIGHT]
+        rate, weight = np.asarray(self.terms.rate), np.asarray(self.terms.weight)
         states = (16.0 + len(self.terms)) * float(np.sum(weight)) + u * float(np.sum(weight / rate))
         found = u * size * (states + 4.0 * self.rest)
         return found, found
@@ -83,7 +88,7 @@ class CreepNumbers(One):
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """The responses with this block added behind the others."""
-        rate, early, late, _ = self.terms.T[:, :, None]
+        rate, early, late = (np.asarray(each)[:, None] for each in (self.terms.rate, self.terms.early, self.terms.late))
         states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
         passed = found.passed * (self.slope - float(np.sum(late)) + states)
         return found._replace(passed=passed, direct=found.direct * self.slope, rest=found.rest * self.rest)
@@ -107,17 +112,19 @@ def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> Cree
         direct, weights = effect.at_once, np.full(len(tau), weight)
     step = np.array([seconds])
     _, early, late = np.array([np.concatenate(decays(step, each)) for each in tau]).T
-    terms = np.column_stack([-np.expm1(-seconds / tau), weights * early, weights * late, weights])
-    return CreepNumbers(direct + float(np.sum(terms[:, LATE])), direct + float(np.sum(weights)), terms)
+    terms = CreepStates.of(
+        zip(-np.expm1(-seconds / tau), weights * early, weights * late, weights, strict=True), np.float64
+    )
+    return CreepNumbers(direct + float(np.sum(terms.late)), direct + float(np.sum(weights)), terms)
 
 
-def shares(terms: Array) -> Array:
+def shares(terms: CreepStates) -> Array:
     """Constants (m, 2) of the states in floating point: 1 - E, and `k = c (1 - b1)`.
 
     A state's contribution to the next output for an input of 0, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`,
     since `b0 + b1 = 1 - E`.
     """
-    return np.column_stack([terms[:, RATE], terms[:, WEIGHT] - terms[:, LATE]])
+    return np.column_stack([terms.rate, np.asarray(terms.weight) - terms.late])
 
 
 # ---------------------------------------------------------------- creep.c
@@ -229,7 +236,7 @@ class UnevenCreep(Block):
         """The `tables` of a step. States advance to the next output with the E and b0 of the next step, and weight an
         input by `(E b1 + b0)/(1 - E)`, with the b1 of this step."""
         now, following = self._numbers(seconds), self._numbers(later)
-        rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
+        rate, late = np.asarray(following.terms.rate), np.asarray(now.terms.late) - following.terms.late
         found = tables([now], lambda values, _: np.array(values))
         found.row.rate[:], found.row.share[:] = shares(following.terms).T
         found.row.share[:] += late * (1.0 - rate) / rate

@@ -70,8 +70,8 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     `code`: fraction bits of a signal, in output codes. Raises OverflowError if the slowest state would stall more than
     a quarter of a code from its target.
     """
-    slowest = float(np.min(effect.terms[:, 0]))
-    states = max(float(np.sum(effect.terms[:, 3])) * size, 1.0)
+    slowest = float(np.min(effect.terms.rate))
+    states = max(float(np.sum(effect.terms.weight)) * size, 1.0)
     wanted = max(math.ceil(-math.log2(slowest)), 0) + GUARD
     bits = min(wanted, STATE_BITS - math.ceil(math.log2(states)) - 1)
     if bits < 0 or bits + code < wanted - GUARD + 1:
@@ -90,7 +90,7 @@ class CreepFormats(Coded):
     @property
     def direct(self) -> float:
         """The fraction of a step that arrives at once."""
-        return self.one.rest - math.fsum(self.one.terms[:, 3].tolist())
+        return self.one.rest - math.fsum(self.one.terms.weight.tolist())
 
     def there(self, size: float, signal: float) -> float:
         """Rounding errors of the output for inputs up to `size`, with signals in units of `signal`."""
@@ -107,7 +107,7 @@ class CreepFormats(Coded):
         one = self.one
         moved = at.asked + at.size * one.rest
         own = one.slope * (missed(1.0 / one.slope) * moved + 0.5 * at.signal)
-        states = at.apart * float(sum(one.terms[:, 3]))
+        states = at.apart * float(sum(one.terms.weight))
         gain = 1.0 / one.slope if at.same else one.backward
         return gain * (error + self.there(at.size, at.signal) + own + states)
 

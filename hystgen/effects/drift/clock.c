@@ -23,20 +23,6 @@ static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *
         ++self->count;
     }
 }
-
-/* The drift `ahead` samples after the present one, limited to +-`farthest`. */
-static int64_t hystgen_clock_drift(const hystgen_clock_table_t *t, const hystgen_clock_t *self,
-                                   int64_t ahead) {
-    const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);
-    const int64_t drift = self->whole + ((self->part + more) >> t->bits);
-    if (drift > t->farthest) {
-        return t->farthest;
-    }
-    if (drift < -t->farthest) {
-        return -t->farthest;
-    }
-    return drift;
-}
 #else
 static void hystgen_clock_start(hystgen_clock_t *self) {
     self->high = 0;
@@ -50,12 +36,18 @@ static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *
     self->low = full ? 0 : next;
     self->high = full ? self->high + 1 : self->high;
 }
+#endif
 
 /* The drift `ahead` samples after the present one, limited to +-`farthest`. */
-static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
-                                          const hystgen_clock_t *self, hystgen_real_t ahead) {
+static hystgen_signal_t hystgen_clock_drift(const hystgen_clock_table_t *t,
+                                            const hystgen_clock_t *self, hystgen_signal_t ahead) {
+#ifdef HYSTGEN_FIXED
+    const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);
+    const int64_t drift = self->whole + ((self->part + more) >> t->bits);
+#else
     const hystgen_real_t time = self->high * t->block + (self->low + ahead) * t->sample;
     const hystgen_real_t drift = (t->rate + t->half_change * time) * time;
+#endif
     if (drift > t->farthest) {
         return t->farthest;
     }
@@ -64,4 +56,3 @@ static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
     }
     return drift;
 }
-#endif

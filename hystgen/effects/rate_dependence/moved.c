@@ -23,12 +23,8 @@ static hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play, 
 #ifndef HYSTGEN_FIXED
 /* Whether play i moves while its input moves to w, or comes to rest there. Sets the value it
    reaches, and its share of a further change of w. */
-#ifdef HYSTGEN_HAS_MOVES_APART
-HYSTGEN_APART
-#else
-static inline
-#endif
-bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigned int i) {
+HYSTGEN_APART_IF_MOVED bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at,
+                                          unsigned int i) {
     const hystgen_real_t *play = self->play;
     const hystgen_real_t w = at->input;
     const hystgen_real_t on = hystgen_stretch(w - play[i], hystgen_model_tables.threshold[i]);
@@ -82,12 +78,8 @@ static hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play, 
 /* Whether play i moves while its input moves to w, or comes to rest there. Sets the value it
    reaches, and its share of a further change of w, which is less than all of it while the band
    around w grows in this direction and more while it shrinks. */
-#ifdef HYSTGEN_HAS_MOVES_APART
-HYSTGEN_APART
-#else
-static inline
-#endif
-bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at, unsigned int i) {
+HYSTGEN_APART_IF_MOVED bool hystgen_tried(const hystgen_inverse_t *self, hystgen_attempt_t *at,
+                                          unsigned int i) {
     const hystgen_real_t *play = self->play;
     const hystgen_real_t w = at->input;
 #ifdef HYSTGEN_HAS_DILATED_PLAYS

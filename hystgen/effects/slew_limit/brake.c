@@ -19,23 +19,7 @@ static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hys
                              hystgen_drive_signal(v > reachable ? v - reachable : reachable - v)));
 }
 
-#if defined(HYSTGEN_HAS_QUIET_DRIVE)
-/* Drive nearest to v that the amplifier reaches in one step, or, unless the drive stands still,
-   from which the lag after the amplifier does not overshoot; v itself in the first step. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
-                                                              hystgen_reach_t v) {
-    if (!self->moving) {
-        return v;
-    }
-    const hystgen_play_t left = hystgen_inverse_left(self);
-    hystgen_inverse_ramp(self, left, v);
-    if (!hystgen_quiet_still(&self->quiet)) {
-        const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
-        hystgen_inverse_ramp(self, left, braked);
-    }
-    return self->reached.drive;
-}
-#elif defined(HYSTGEN_HAS_STEADY_LAG)
+#if defined(HYSTGEN_HAS_STEADY_LAG) && !defined(HYSTGEN_HAS_QUIET_DRIVE)
 /* The drive v, or one that keeps the lag on its branch. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_inverse_t *self,
                                                             hystgen_reach_t v) {
@@ -43,9 +27,16 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_invers
         &self->steady, &hystgen_braked_1, &self->braked_1.lag, hystgen_drive_signal(v),
         hystgen_drive_signal(self->applied), HYSTGEN_DITHER));
 }
+#else
+static hystgen_reach_t hystgen_inverse_kept(const hystgen_inverse_t *self, hystgen_reach_t v) {
+    (void)self;
+    return v;
+}
+#endif
 
-/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
-   amplifier neither overshoots nor leaves its branch; v itself in the first step. */
+/* Drive nearest to v that the amplifier reaches in one step, or, unless the drive stands still,
+   from which the lag after the amplifier neither overshoots nor leaves its branch; v itself in the
+   first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {
@@ -53,22 +44,12 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
     }
     const hystgen_play_t left = hystgen_inverse_left(self);
     hystgen_inverse_ramp(self, left, v);
+#ifdef HYSTGEN_HAS_QUIET_DRIVE
+    if (hystgen_quiet_still(&self->quiet)) {
+        return self->reached.drive;
+    }
+#endif
     const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
     hystgen_inverse_ramp(self, left, hystgen_inverse_kept(self, braked));
     return self->reached.drive;
 }
-#else
-/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
-   amplifier does not overshoot; v itself in the first step. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
-                                                              hystgen_reach_t v) {
-    if (!self->moving) {
-        return v;
-    }
-    const hystgen_play_t left = hystgen_inverse_left(self);
-    hystgen_inverse_ramp(self, left, v);
-    const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
-    hystgen_inverse_ramp(self, left, braked);
-    return self->reached.drive;
-}
-#endif

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e90ca7cb450ab945b63421df0cebffe6d7aa7ef6b10508ae5e13c2c9a16e4430, without this line
+ * Text: sha256 1f5b7142efe6c5bc194ef6fa5ccc8d0d020a5fac5e83f3ce4af48a4e4d8358c4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -56,7 +56,6 @@ typedef struct {
 /* The drive of a start memory, within the drive range. */
 typedef struct {
     int32_t drive;
-    bool ascending;
 } curved_drive_t;
 
 /* Ends of one branch of the inverse from the input of the plays to the drive. */
@@ -373,7 +372,7 @@ static const curved_segment_t curved_model_segment[8] = {
 static const curved_curve_t curved_model_curve = {curved_model_segment, 0, {24326966, 26766226}, 6};
 static const int32_t curved_model_start[1] = {0};
 static const int32_t curved_model_zero[1] = {0};
-static const curved_drive_t curved_inverse_first_drive[2] = {{-2731, true}, {-2731, true}};
+static const curved_drive_t curved_inverse_first_drive[2] = {{-2731}, {-2731}};
 /* w = G[v] */
 static const int32_t curved_front_knot[42] = {
     -32767, -30719, -28671, -26623, -24575, -22527, -20479, -18431, -16383, -15359, -14335, -13311,
