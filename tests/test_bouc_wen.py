@@ -33,7 +33,8 @@ THRESHOLDS, WEIGHTS = (0.0, 0.45, 0.9), (0.72, 0.6, 0.48)
 
 def make(**keys: Any) -> Effect:
     """An effect built from its keys in a parameter file."""
-    return shapes("bouc_wen")["shape" in keys].model_validate({"name": "bouc_wen", **keys})
+    at = ("bouc_wen", "dahl", "duhem").index(keys.get("shape", "bouc_wen"))
+    return shapes("bouc_wen")[at].model_validate({"name": "bouc_wen", **keys})
 
 
 def wave(n: int, seed: int, size: float = 2.0) -> Array:
@@ -45,20 +46,21 @@ def wave(n: int, seed: int, size: float = 2.0) -> Array:
     return np.asarray(size * np.sum(parts, axis=0))
 
 
-def integrated(w: Array, width: float, exponent: float, balance: float, parts: int) -> Array:
+def integrated(w: Array, width: float, exponent: float, balance: float, parts: int, tilt: float = 0.0) -> Array:
     """z at the inputs `w`, by the classical Runge-Kutta method with `parts` steps from each input to the next."""
 
-    def slope(z: float, sign: float) -> float:
-        return 1.0 - (balance * np.sign(z * sign) + 1.0 - balance) * abs(z / width) ** exponent
+    def slope(x: float, z: float, sign: float) -> float:
+        return 1.0 + tilt * x - (balance * np.sign(z * sign) + 1.0 - balance) * abs(z / width) ** exponent
 
     z, found = 0.0, [0.0]
-    for move in np.diff(w).tolist():
+    for start, move in zip(w[:-1].tolist(), np.diff(w).tolist(), strict=True):
         h, sign = move / parts, float(np.sign(move))
-        for _ in range(parts if move else 0):
-            a = slope(z, sign)
-            b = slope(z + 0.5 * h * a, sign)
-            c = slope(z + 0.5 * h * b, sign)
-            d = slope(z + h * c, sign)
+        for k in range(parts if move else 0):
+            x = start + k * h
+            a = slope(x, z, sign)
+            b = slope(x + 0.5 * h, z + 0.5 * h * a, sign)
+            c = slope(x + 0.5 * h, z + 0.5 * h * b, sign)
+            d = slope(x + h, z + h * c, sign)
             z += h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
         found.append(z)
     return np.array(found)
@@ -90,6 +92,29 @@ def test_an_element_is_its_equation(exponent: float, balance: float) -> None:
     assert np.max(np.abs(found)) <= width
 
 
+@pytest.mark.parametrize(("width", "tilt"), [(0.8, 0.1), (0.8, -0.1), (4.0, -0.07), (0.2, 0.11)])
+def test_a_tilted_element_is_its_equation(width: float, tilt: float) -> None:
+    """The same for Duhem's elements, whose input stays where `|tilt| width < 1 + tilt w`."""
+    w = wave(301, 3)
+    effect = make(shape="duhem", weights=(1.0,), widths=(width,), tilts=(tilt,))
+    assert not [*effect.problems_within(float(np.min(w)), float(np.max(w)))]
+    fine, coarse = (integrated(w, width, 1.0, 1.0, parts, tilt) for parts in (100, 50))
+    assert np.max(np.abs(effect.parallel(w) - fine)) < 2.0 * np.max(np.abs(fine - coarse)) + 1e-13
+    assert np.max(np.abs(fine - coarse)) < 2e-5
+
+
+@pytest.mark.parametrize(("alpha", "a", "c", "d"), [(0.06, 0.1, 0.06, 2e-4), (0.1, 0.1, 0.15, -4e-4)])
+def test_a_duhem_plant_is_an_element(alpha: float, a: float, c: float, d: float) -> None:
+    """`dy = alpha |dv| (a v - y) + (c + d v) dv`: the difference is the tolerance of the plant's integration."""
+    along = wave(1500, 5)
+    v = np.concatenate([[0.0], 50.0 + 50.0 * along / np.max(np.abs(along))])
+    effect = make(shape="duhem", weights=(c - a,), widths=(1.0 / alpha,), tilts=(d / (c - a),))
+    assert not [*effect.problems_within(0.0, 100.0)]
+    plant = plants.Duhem.coleman_hodgdon(alpha, lambda x: a * x, lambda x: c + d * x)
+    found = Chain(Cascade(PI([0.0], [a])), [effect]).output(Run(np.arange(len(v)) * 1e-3, v))
+    assert np.max(np.abs(found - plant.simulate(v))) < 1e-8
+
+
 @pytest.mark.parametrize(("beta", "gamma", "n"), [(0.5, 0.5, 1.0), (0.6, -0.3, 1.0), (0.6, 0.3, 2.0), (0.4, -0.2, 2.0)])
 def test_a_bouc_wen_plant_is_an_element(beta: float, gamma: float, n: float) -> None:
     """`D dz/dv = 1 - (beta sgn + gamma) |z|^n` in the plant's units; the element's has `|z| <= width`."""
@@ -114,6 +139,15 @@ def test_dahl_is_bouc_wen_with_exponent_and_balance_1() -> None:
     w = wave(500, 7)
     keys = {"weights": (0.3, -0.1), "widths": (0.5, 2.0)}
     assert np.array_equal(make(**keys).parallel(w), make(shape="dahl", **keys).parallel(w))
+
+
+def test_many_small_reversals_of_a_tilted_element_leave_no_error_behind() -> None:
+    """The same with Duhem's law, by which z shrinks by `z/width` per distance, while the tilt cancels in each pair."""
+    pairs, d, width, tilt = 200_000, 1e-9, 1.0, 0.2
+    w = np.concatenate([np.linspace(0.0, 0.3, 50), np.tile([0.3 + d, 0.3], pairs)])
+    z = make(shape="duhem", weights=(1.0,), widths=(width,), tilts=(tilt,)).parallel(w)
+    moved = pairs * d * 2.0 * z[49] / width
+    assert abs(z[49] - z[-1] - moved) < 1e-3 * moved + 1e-11
 
 
 @law
@@ -178,7 +212,7 @@ def test_a_hypothesis_is_the_chain(others: tuple[str, ...], history: tuple[float
 def test_candidates_are_effects_and_contain_none() -> None:
     about = About((-1.0, 4.0), 8.0, 1e-3, 2.0, 2.0, 50.0, 30.0, THRESHOLDS)
     found = [each for kind in shapes("bouc_wen") for each in kind.candidates(about)]
-    assert len({each.label for each in found}) == len(found) == 4
+    assert len({each.label for each in found}) == len(found) == 5
     w = wave(300, 2)
     for each in found:
         for x in (each.low, each.high, each.start, *each.others):
@@ -199,6 +233,12 @@ REFUSED = {
     "weights: [1], widths: [1], balance: 5": "balance: must be at most 4",
     "shape: dahl, weights: [1], widths: [1], exponent: 1": "exponent: unknown key",
     "shape: dahl, weights: [1]": "widths: is missing",
+    "shape: duhem, weights: [1], widths: [1]": "tilts: is missing",
+    "shape: duhem, weights: [1], widths: [1], tilts: [0, 0]": "tilts: has 2 values for 1 in weights; give as many as",
+    "shape: duhem, weights: [1], widths: [3], tilts: [-0.25]":
+        "tilts[0]: must be above -0.25, not -0.25: for inputs w = 0 .. 1, 1 + tilt w has to exceed |tilt| times the "
+        "width",
+    "shape: duhem, weights: [1, 1], widths: [1, 0.5], tilts: [0.99, 2]": "tilts[1]: must be below 2, not 2: for",
 }
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hystgen.arithmetic.factors import factor
+from hystgen.basics.problems import path_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.fixed_tables import FixedCurve, reciprocal
@@ -95,6 +96,13 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
     joining = [effect for effect in effects if effect.joins_plays()]
+    wrong = [(each, found) for each in joining for found in each.problems_within(*static.play_range)]
+    if wrong:
+        yield from ((effect, f"{path_text(keys)}: {message}") for effect, (keys, message) in wrong)
+        return
+    if any(any(effect.leans) for effect in joining):
+        yield joining[0], "tilted elements are not in the C"
+        return
     if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
         falling = -parallel_slopes(static, joining)[0]
         what = f"right after a turn the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"

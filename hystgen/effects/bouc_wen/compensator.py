@@ -9,7 +9,7 @@ import numpy as np
 
 from hystgen.basics.jit import Scalar, jit
 from hystgen.effects.bouc_wen.curve import halves
-from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach
+from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach, turned_at, value
 from hystgen.effects.bouc_wen.pieces import CurvePieces, largest, pieces
 from hystgen.effects.part import late
 from hystgen.effects.plays import (
@@ -42,28 +42,29 @@ class LoadedElements:
     def __init__(self, effect: BoucWenElements | DahlElements) -> None:
         exponent, balance = effect.law
         self.above, self.below = halves(exponent, balance)
-        self.elements = list(zip(effect.weights, effect.widths, strict=True))
+        self.elements = list(zip(effect.weights, effect.widths, effect.leans, strict=True))
         self.rest(0.0)
 
     def rest(self, w: float) -> None:
         """Unload every element, z = 0, with the input at w."""
         self.way, self.turned, self.input = 1.0, w, w
-        self.begin = [0.0] * len(self.elements)
+        self.begin = [width * tilt for _, width, tilt in self.elements]
 
-    def _s(self, j: int, way: float, begin: float, w: float) -> float:
-        return float(reach(self.above, self.below, begin + way * (w - self.turned) / self.elements[j][1]))
-
-    def _turned(self) -> list[float]:
-        here = [self._s(j, self.way, begin, self.input) for j, begin in enumerate(self.begin)]
-        return [float(place_of(self.above, self.below, -s)) for s in here]
+    def _values(self) -> list[float]:
+        found = zip(self.begin, self.elements, strict=True)
+        ends = self.turned, self.input
+        return [
+            float(value(self.above, self.below, begin, self.way, ends, (width, tilt)))
+            for begin, (_, width, tilt) in found
+        ]
 
     def total(self, w: float) -> float:
         """`sum k z` after the input has moved to w; moves nothing."""
         kept = self.way, self.turned, self.input, self.begin
         self.move(w)
         found = sum(
-            weight * width * self.way * self._s(j, self.way, self.begin[j], w)
-            for j, (weight, width) in enumerate(self.elements)
+            weight * width * (self.way * s - width * tilt)
+            for s, (weight, width, tilt) in zip(self._values(), self.elements, strict=True)
         )
         self.way, self.turned, self.input, self.begin = kept
         return found
@@ -71,7 +72,8 @@ class LoadedElements:
     def move(self, w: float) -> None:
         """Move the input to w."""
         if self.way * (w - self.input) < 0.0:
-            self.begin = self._turned()
+            found = zip(self._values(), self.elements, strict=True)
+            self.begin = [float(turned_at(self.above, self.below, s, tilt)) for s, (*_, tilt) in found]
             self.way, self.turned = -self.way, self.input
         self.input = w
 

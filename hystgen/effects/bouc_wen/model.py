@@ -1,7 +1,8 @@
-"""Elements in parallel with the plays whose minor loops stay open: Bouc-Wen and Dahl."""
+"""Elements in parallel with the plays whose minor loops stay open: Bouc-Wen, Dahl and Duhem."""
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -41,6 +42,12 @@ BALANCES, EXPONENTS = (0.51, 3.0), (1.0, 5.0)
 STARTS = 5
 """Number of widths from which a search starts, each about three times the previous one."""
 
+MOST_TILT = 0.98
+"""[1] Largest tilt tried, as a share of that at which z has no limit at one end of the drive range."""
+
+LEAST_DRIVE = 0.02
+"""[1] Smallest `dz/dw` at z = w = 0 tried, over that in the middle of the drive range, which may be far from 0."""
+
 DAHL = "bouc_wen, dahl"
 
 
@@ -59,19 +66,39 @@ def place_of(above: Half, below: Half, s: float) -> float:
 
 
 @jit
-def element(w: Array, width: float, weight: float, above: Half, below: Half, total: Array) -> None:
+def value(
+    above: Half, below: Half, begin: float, way: float, ends: tuple[float, float], shape: tuple[float, float]
+) -> float:
+    """s of an element, `z/width + tilt width` in the direction `way`, after a move between `ends` since its last turn,
+    there with its place on the curve at `begin` or, if tilted, with this s. `shape`: its width and tilt."""
+    (turned, w), (width, tilt) = ends, shape
+    x = way * (w - turned) / width
+    if tilt == 0.0:
+        return reach(above, below, begin + x)
+    return begin - (1.0 + tilt * turned - begin) * math.expm1(-x) + tilt * (w - turned)
+
+
+@jit
+def turned_at(above: Half, below: Half, s: float, tilt: float) -> float:
+    """Where an element begins after a turn at s, which changes its sign."""
+    return place_of(above, below, -s) if tilt == 0.0 else -s
+
+
+@jit
+def element(w: Array, width: float, tilt: float, weight: float, above: Half, below: Half, total: Array) -> None:
     """Add `weight z` to `total`, for the input `w`, from z = 0 at its first sample.
 
-    Between turns the place on the curve is that of the last turn plus the distance from there, so that no rounding
-    errors accumulate over the samples.
+    Between turns the element follows its curve from the last turn on, so that no rounding errors accumulate over the
+    samples.
     """
-    way, turned, begin = 1.0, w[0], 0.0
+    way, turned, begin = 1.0, w[0], tilt * width
     for k in range(1, len(w)):
         move = w[k] - w[k - 1]
         if way * move < 0.0:
-            s = reach(above, below, begin + way * (w[k - 1] - turned) / width)
-            begin, turned, way = place_of(above, below, -s), w[k - 1], -way
-        total[k] += weight * width * way * reach(above, below, begin + way * (w[k] - turned) / width)
+            s = value(above, below, begin, way, (turned, w[k - 1]), (width, tilt))
+            begin, turned, way = turned_at(above, below, s, tilt), w[k - 1], -way
+        s = value(above, below, begin, way, (turned, w[k]), (width, tilt))
+        total[k] += weight * width * (way * s - tilt * width)
 
 
 class _ParallelElements(Effect):
@@ -100,16 +127,20 @@ class _ParallelElements(Effect):
     def law(self) -> tuple[float, float]:
         """Exponent and balance."""
 
+    @property
+    def leans(self) -> tuple[float, ...]:
+        """t_j, by which the drive of each element is tilted."""
+        return (0.0,) * len(self.weights)
+
     def parallel(self, w: Array) -> Array:
         """`sum k_j z_j` (N,), from z_j = 0 at the first sample."""
         total = np.zeros(len(w))
-        for weight, width in zip(self.weights, self.widths, strict=True):
-            element(np.ascontiguousarray(w), width, weight, *halves(*self.law), total)
+        for weight, width, tilt in zip(self.weights, self.widths, self.leans, strict=True):
+            element(np.ascontiguousarray(w), width, tilt, weight, *halves(*self.law), total)
         return total
 
-
     def transients(self, run: Run) -> Array:
-        """`exp(-travel/width_j)`: exact for Dahl's law, whose equation is linear in z while the input moves one way."""
+        """`exp(-travel/width_j)`: exact for the laws of Dahl and Duhem, linear in z while the input moves one way."""
         return np.asarray(np.exp(-run.travelled / np.array(self.widths)[:, None]))
 
 
@@ -189,6 +220,60 @@ class DahlElements(_ParallelElements):
         return found if about.speeds else []
 
 
+class DuhemElements(_ParallelElements):
+    """Dahl's elements with a tilted drive: `dz = dw (1 + t w) - |dw| z/width`.
+
+    With `y = p w + k z` these are Duhem plants of Coleman and Hodgdon, `dy = |dw| (p w - y)/width + (c + d w) dw` with
+    c = p + k and d = k t (A constitutive relation for rate-independent hysteresis in ferromagnetically soft materials,
+    Int. J. Eng. Sci. 24, 1986).
+    """
+
+    shape: Literal["duhem"] = Field(description="Dahl's law with a tilted drive")
+    tilts: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
+        description="as many as weights, t_j, 1 / input unit of the plays", examples=[[-0.005]]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """A problem unless there are one width and one tilt for each weight."""
+        yield from super().problems(thresholds)
+        yield from not_as_many("tilts", self.tilts, "weights", self.weights)
+
+    def problems_within(self, low: float, high: float) -> Iterator[Problem]:
+        """A problem for each tilt with which z would somewhere turn back while the input moves on."""
+        for j, (tilt, width) in enumerate(zip(self.tilts, self.widths, strict=False)):
+            room, side = (width - low, "below ") if tilt > 0.0 else (width + high, "above -")
+            if not abs(tilt) * room < 1.0:
+                message = f"must be {side}{1.0 / room:.6g}, not {tilt:.6g}: for inputs w = {low:.6g} .. {high:.6g}"
+                yield ("tilts", j), f"{message}, 1 + tilt w has to exceed |tilt| times the width"
+
+    @property
+    def law(self) -> tuple[float, float]:
+        """Exponent and balance."""
+        return 1.0, 1.0
+
+    @property
+    def leans(self) -> tuple[float, ...]:
+        """t_j, by which the drive of each element is tilted."""
+        return self.tilts
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One element; tried if Dahl's element helps; none at a single speed."""
+        middle, half = 0.5 * sum(about.drive), 0.5 * (about.drive[1] - about.drive[0])
+
+        def build(x: Array) -> DuhemElements:
+            (weight,), (width,) = _elements(x[None, :2], about)
+            lean = x[2] / (half + width)  # about the middle: at 1 and -1, z has no limit at one end
+            if lean * middle > 1.0 - LEAST_DRIVE:
+                lean = (1.0 - LEAST_DRIVE) / middle
+            tilts = (lean / (at_0 := 1.0 - lean * middle),)
+            return cls(name="bouc_wen", shape="duhem", weights=(weight * at_0,), widths=(width,), tilts=tilts)
+
+        more = np.array([[-MOST_TILT, MOST_TILT, 0.0]])
+        one = _candidate("bouc_wen, duhem", 1, build, more)
+        return [replace(one, beyond=DAHL, grown=lambda x: np.append(x, 0.0))] if about.speeds else []
+
+
 def _elements(x: Array, about: About) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Weights and widths from a fit's coordinates (k, 2): mean slopes, and decimal logarithms of drive ranges."""
     wide = about.drive[1] - about.drive[0]
@@ -213,9 +298,9 @@ def _candidate(label: str, count: int, build: Callable[[Array], Effect], more: A
     )
 
 
-SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements)
+SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements, DuhemElements)
 
 
 def load() -> None:
     """Compile the elements, or load them from the cache, by running them on two samples."""
-    element(np.array([0.0, 1.0]), 1.0, 1.0, *halves(1.0, 1.0), np.zeros(2))
+    element(np.array([0.0, 1.0]), 1.0, 0.0, 1.0, *halves(1.0, 1.0), np.zeros(2))
