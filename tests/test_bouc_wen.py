@@ -19,7 +19,9 @@ from hystgen.chain.chain import Chain
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects import About, Effect, Run, shapes
+from hystgen.effects.bouc_wen.compensator import DEGREE, EXACT
 from hystgen.effects.bouc_wen.curve import distance, halves, size
+from hystgen.effects.bouc_wen.pieces import pieces
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
@@ -258,11 +260,13 @@ ARITHMETICS = ("float32", "float64", "q31", "q15")
 
 TWO = "name: bouc_wen, weights: [-0.2, 0.1], widths: [2, 0.7], exponent: 1.6, balance: 1.3"
 DAHL = "name: bouc_wen, shape: dahl, weights: [-0.15], widths: [1]"
+TILTED = "name: bouc_wen, shape: duhem, weights: [-0.2, 0.1], widths: [2, 0.7], tilts: [-0.06, 0.08]"
 SOFT = "name: bouc_wen, weights: [3], widths: [0.5], exponent: 2"
 
 COMBINED = {
     "alone": (TWO,),
     "soft": (SOFT,),
+    "tilted": (TILTED,),
     "dilated": (DAHL, "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]"),
     "dashpot": (TWO, "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5"),
     "relaxing": (DAHL, "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3"),
@@ -312,7 +316,7 @@ def held(one: Model, x: Array, arithmetic: str, unit: int) -> Array:
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize("effect", [TWO, DAHL, SOFT])
+@pytest.mark.parametrize("effect", [TWO, DAHL, TILTED, SOFT])
 def test_both_operators_follow_the_model(effect: str, arithmetic: str) -> None:
     """Errors are a few roundings: in floating point of the largest output, in fixed point of the codes."""
     one = model("one", effect)
@@ -323,17 +327,23 @@ def test_both_operators_follow_the_model(effect: str, arithmetic: str) -> None:
     size, slopes = float(np.max(np.abs(y))), 2.0  # the sum of all weights is below 2.6, the least slope above 0.5
     units = codes(one, arithmetic)
     unit = {"float32": 2.0**-24 * size, "float64": 2.0**-53 * size}.get(arithmetic, units[1])
+    allowed = 16.0 * unit
+    if (effect, arithmetic) == (TILTED, "float64"):
+        # the model has this curve as an exponential, the C as polynomials, whose errors are not roundings alone
+        curve, found = pieces(1.0, 1.0, DEGREE, EXACT), one.compiled(arithmetic).tables.moving.elements.element
+        allowed = (curve.error + curve.slip) * float(np.sum(np.abs(found.amplitude)))
     found = answers(one, v, arithmetic)
-    assert np.max(np.abs(found - y)) < 16.0 * unit
+    assert np.max(np.abs(found - y)) < allowed
     references = held(one, y, arithmetic, 1)
     sent = answers(one, references, arithmetic, inverse=True)
-    assert np.max(np.abs(one.simulate(sent) - references)) < 16.0 * unit + slopes * units[0] * (units[0] < 1.0)
+    assert np.max(np.abs(one.simulate(sent) - references)) < allowed + slopes * units[0] * (units[0] < 1.0)
 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
-def test_a_dithered_rest_gathers_no_error(arithmetic: str) -> None:
+@pytest.mark.parametrize("effect", [TWO, TILTED])
+def test_a_dithered_rest_gathers_no_error(effect: str, arithmetic: str) -> None:
     """A million moves of a last bit either way: the exact law then relaxes z by as much as the arithmetic does."""
-    one = model("one", TWO)
+    one = model("one", effect)
     low, high = one.cascade.input_range
     drive, output = codes(one, arithmetic)
     bit = drive if drive < 1.0 else 2.0**-23 * 2.0

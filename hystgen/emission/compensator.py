@@ -281,6 +281,14 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
     ]
 
 
+def structures(writer: Writer, *arrays: tuple[str, Struct]) -> list[ConstantTable]:
+    """Tables of structures, whose types are named like them, unless they are empty."""
+    return [
+        writer.rows(f"{name}_t", name, [", ".join(members(type(part), row)) for row in part], len(part))
+        for name, part in arrays if len(part)
+    ]
+
+
 def truth(x: object) -> str:
     """A truth value in C."""
     return "true" if x else "false"
@@ -404,7 +412,10 @@ class EmittedModel:
     def unread(self) -> Mapping[str, Sequence[str]]:
         """Fields of the types of its tables that none of its functions reads, by type."""
         t, options, form = self.numbers.tables, self.options, self.form
-        wanted = {"curve_t": (limits(t, options), form.limited), "tables_t": (solves(t, options), form.solved)}
+        wanted = {
+            "curve_t": (limits(t, options), form.limited), "tables_t": (solves(t, options), form.solved),
+            "element_t": (self.variant.tilted, ["lean"]),
+        }
         return {f"hystgen_{own}": fields for own, (read, fields) in wanted.items() if not read}
 
     @property

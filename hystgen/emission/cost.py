@@ -331,7 +331,7 @@ def _elements(m: MovingTables | FixedMovingTables) -> tuple[tuple[int, int], tup
         at = 2 * degree + 8, looked + 8  # five products have two parts, and each piece's slope comes with its mean
         put = degree * (degree + 5) // 2 + 5, looked + 8
     else:
-        degree = (m.elements.piece.shape[1] - 2) // 2
+        degree = m.elements.piece.up.shape[1]
         at = 2 * degree + 2, looked + 2
         put = degree * (degree + 3) // 2, looked + 2
     if not count:

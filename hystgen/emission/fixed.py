@@ -25,6 +25,7 @@ from hystgen.emission.compensator import (
     members,
     pointers,
     solves,
+    structures,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Codes, Compiled
     from hystgen.compensator.chain.moving import FixedMovingTables
     from hystgen.effects.bend import Bends
-    from hystgen.effects.plays import FixedElementTables
     from hystgen.model import Model
 
 COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
@@ -170,11 +170,13 @@ class FixedForm(Form):
                 ("BUMP_BITS", f"{plays.bump_bits}u", "bits of its values below a step of the plays' input"),
             ]
         if count := len(plays.elements.element):
-            arrays += _elements(plays.elements, writer)
+            own = plays.elements
+            arrays += structures(writer, ("piece", own.piece), ("element_table", own.element), ("tilt", own.tilt))
             numbers += [
                 ("ELEMENTS", f"{count}u", "in parallel with the plays"),
-                ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
-                ("STRAIGHT", operand(plays.elements.straight), "steps of the input over which their sum is straight"),
+                ("PIECES", f"{len(own.piece)}u", "of their curve"),
+                ("BASE", operand(own.base[0]), "subtracted from the sum of elements with a tilted drive"),
+                ("STRAIGHT", operand(own.straight), "steps of the input over which their sum is straight"),
             ]
         return arrays, numbers
 
@@ -348,15 +350,6 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
         *(text for curve in curves for text in curve),
         writer.rows("bump_t", "bump", rows, len(curves)),
         writer.array("uint16_t", "bump_of", list(t.bump_of)),
-    ]
-
-
-def _elements(t: FixedElementTables, writer: Writer) -> list[ConstantTable]:
-    """The pieces of the curve of elements in parallel with the plays, and the elements."""
-    arrays = (("piece_t", "piece", t.piece), ("element_table_t", "element_table", t.element))
-    return [
-        writer.rows(kind, name, [", ".join(members(type(part), row)) for row in part], len(part))
-        for kind, name, part in arrays
     ]
 
 

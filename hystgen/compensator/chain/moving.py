@@ -53,8 +53,7 @@ def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None
 
 def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.ParallelTerms]:
     """The elements in parallel with the plays, if an effect adds them."""
-    low, high = static.play_range
-    return [ELEMENTS.of(effect, high - low) for effect in effects if effect.joins_plays()]
+    return [ELEMENTS.of(effect, *static.play_range) for effect in effects if effect.joins_plays()]
 
 
 def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
@@ -64,10 +63,10 @@ def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 def parallel_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, float]:
     """Smallest and largest change of the sum of the elements per change of their input, over all histories."""
-    found = [each.weights * each.steepest for each in parallel(static, effects)]
+    found = [each.weights * np.stack([each.flattest, each.steepest]) for each in parallel(static, effects)]
     return (
-        math.fsum(float(np.sum(np.minimum(each, 0.0))) for each in found),
-        math.fsum(float(np.sum(np.maximum(each, 0.0))) for each in found),
+        math.fsum(float(np.sum(np.min(each, axis=0))) for each in found),
+        math.fsum(float(np.sum(np.max(each, axis=0))) for each in found),
     )
 
 
@@ -99,9 +98,6 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     wrong = [(each, found) for each in joining for found in each.problems_within(*static.play_range)]
     if wrong:
         yield from ((effect, f"{path_text(keys)}: {message}") for effect, (keys, message) in wrong)
-        return
-    if any(any(effect.leans) for effect in joining):
-        yield joining[0], "tilted elements are not in the C"
         return
     if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
         falling = -parallel_slopes(static, joining)[0]

@@ -9,10 +9,12 @@ import numpy as np
 
 from hystgen.basics.jit import Scalar, jit
 from hystgen.effects.bouc_wen.curve import halves
-from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach, turned_at, value
-from hystgen.effects.bouc_wen.pieces import CurvePieces, largest, pieces
+from hystgen.effects.bouc_wen.model import Elements as Effect
+from hystgen.effects.bouc_wen.model import turned_at, value
+from hystgen.effects.bouc_wen.pieces import CurvePieces, extremes, pieces
 from hystgen.effects.part import late
 from hystgen.effects.plays import (
+    CurvePiece,
     ElementNumbers,
     Elements,
     ElementsPart,
@@ -21,7 +23,9 @@ from hystgen.effects.plays import (
     ElementTables,
     FixedElementTables,
     ParallelTerms,
+    Tilt,
 )
+from hystgen.plays.slots import Reals
 
 DEGREE = 7
 """Degree of the curve's polynomials in floating point, by the pieces that `pieces` needs for three laws: 17 to 32 in
@@ -39,7 +43,7 @@ EXACT = 1e-14
 class LoadedElements:
     """Elements in double precision, one input at a time."""
 
-    def __init__(self, effect: BoucWenElements | DahlElements) -> None:
+    def __init__(self, effect: Effect) -> None:
         exponent, balance = effect.law
         self.above, self.below = halves(exponent, balance)
         self.elements = list(zip(effect.weights, effect.widths, effect.leans, strict=True))
@@ -78,13 +82,17 @@ class LoadedElements:
         self.input = w
 
 
-def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
-    """What a compensator needs to know of an effect's elements, for inputs within `span`."""
+def of(effect: Effect, low: float, high: float) -> ParallelTerms:
+    """What a compensator needs to know of an effect's elements, for inputs within a range."""
     exponent, balance = effect.law
-    weights, widths = np.array(effect.weights), np.array(effect.widths)
-    most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
-    steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
-    bend = exponent * max(1.0, 2.0 * balance - 1.0) * steepest / widths  # as |s| <= 1
+    weights, widths, drive, lean, top = effect.tilted(low, high)
+    shapes = zip(effect.widths, effect.leans, strict=True)
+    ends, most, steepest = (
+        np.array(each) for each in zip(*(extremes(shape, effect.law, low, high) for shape in shapes), strict=True)
+    )
+    bend = exponent * max(1.0, 2.0 * balance - 1.0) * (steepest + np.abs(lean)) / widths  # as |s| <= 1
+    base = np.array([weights * widths @ lean])
+    tilted = len(lean) * bool(np.any(lean))
 
     def polynomials(dtype: Any) -> CurvePieces:
         return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
@@ -92,27 +100,28 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
     def error(dtype: Any, emitted: bool) -> float:
         found, unit = polynomials(dtype), float(np.finfo(dtype).eps) / 2
         off = (found.error, found.slip) if emitted else (EXACT, EXACT)
-        size = float(np.abs(weights) @ widths)
-        return size * drifted(exponent, off[0] + 8.0 * unit, off[1] + 16.0 * unit)
+        size = float(np.abs(weights) @ (widths * drive))
+        return size * drifted(exponent, off[0] + 8.0 * unit, off[1] + (24.0 if tilted else 16.0) * unit)
 
     def tables(dtype: Any) -> ElementTables:
         found = polynomials(dtype)
-        rows = np.zeros((len(found.begin), 2 + 2 * DEGREE))
-        rows[:, 0], rows[:, 1] = found.begin, found.level
-        rows[:-1, 2 : 2 + DEGREE], rows[:-1, 2 + DEGREE :] = found.up, found.back
-        numbers = zip(weights, weights * widths, 1.0 / widths, strict=True)
-        return ElementTables(np.array(rows, dtype=dtype), ElementNumbers.of(numbers, dtype))
+        level_on = np.zeros(DEGREE)  # behind the last piece
+        rows = zip(found.begin, found.level, [*found.up, level_on], [*found.back, level_on], strict=True)
+        numbers = zip(weights * drive, weights * drive * widths, 1.0 / widths, strict=True)
+        tilt = Tilt.of([*zip(lean / drive, top, strict=True)][:tilted], dtype)
+        return ElementTables(CurvePiece.of(rows, dtype), ElementNumbers.of(numbers, dtype), tilt, base.astype(dtype))
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
 
     def straight(step: float, unit: float, off: float) -> FixedElementTables:
         most = float(np.abs(weights) @ bend)
-        found: FixedElementTables = coded[0]()(effect, step, unit, math.sqrt(2.0 * off / most) if most else math.inf)
+        near = math.sqrt(2.0 * off / most) if most else math.inf
+        found: FixedElementTables = coded[0]()(effect, (low, high), step, unit, near)
         return found
 
     return ParallelTerms(
-        weights, most * widths, steepest, bend, LoadedElements(effect), tables, error,
-        straight, lambda: coded[1]()(effect),
+        weights, most, ends, -np.abs(lean), steepest, bend, LoadedElements(effect), tables, error,
+        straight, lambda: coded[1]()(effect, low, high),
     )
 
 
@@ -131,13 +140,13 @@ def drifted(exponent: float, error: float, slip: float) -> float:
 
 
 @jit
-def piece_at(t: ElementTables, column: int, x: Scalar) -> int:
-    """The piece in which a place (column 0) or a value of the curve (column 1) lies."""
+def piece_at(begins: Reals, x: Scalar) -> int:
+    """The piece in which a place or a value of the curve lies, given where pieces begin."""
     low = 0
-    high = len(t.piece)
+    high = len(begins)
     while high - low > 1:
         middle = (low + high) // 2
-        if x < t.piece[middle, column]:
+        if x < begins[middle]:
             high = middle
         else:
             low = middle
@@ -158,37 +167,53 @@ def gained(t: ElementTables, m: ElementsState[ElementState], j: int, x: Scalar) 
             value = value * x + m.element.c[j, k]
             slope = slope * x + value
         return value * x, slope
-    i = piece_at(t, 0, m.element.place[j] + x)
-    h = m.element.place[j] + x - t.piece[i, 0]
-    value = t.piece[i, n + 1]
+    i = piece_at(t.piece.begin, m.element.place[j] + x)
+    h = m.element.place[j] + x - t.piece.begin[i]
+    value = t.piece.up[i, n - 1]
     slope = value
-    for k in range(n, 1, -1):
-        value = value * h + t.piece[i, k]
+    for k in range(n - 2, -1, -1):
+        value = value * h + t.piece.up[i, k]
         slope = slope * h + value
-    return t.piece[i, 1] + value * h - m.element.level[j], slope
+    value = t.piece.level[i] + value * h - m.element.level[j]
+    if len(t.tilt) > 0:
+        slope = slope + m.element.lean[j]
+        value = value + m.element.lean[j] * x
+    return value, slope
 
 
 @jit
 def put(t: ElementTables, m: ElementsState[ElementState], j: int, s: Scalar) -> None:
     """Put element j at the value s of the curve."""
     n = m.element.c.shape[1]
-    i = piece_at(t, 1, s)
-    u = s - t.piece[i, 1]
-    h: Scalar = t.piece[i, 2 * n + 1]
-    for k in range(2 * n, n + 1, -1):
-        h = h * u + t.piece[i, k]
+    i = piece_at(t.piece.level, s)
+    u = s - t.piece.level[i]
+    h: Scalar = t.piece.back[i, n - 1]
+    for k in range(n - 2, -1, -1):
+        h = h * u + t.piece.back[i, k]
     h = h * u
     for k in range(n):
-        m.element.c[j, k] = t.piece[i, 2 + k]
+        m.element.c[j, k] = t.piece.up[i, k]
     for k in range(n - 1, 0, -1):  # the piece's polynomial about h: its value there, then its coefficients
         m.element.c[j, k - 1] = m.element.c[j, k - 1] + h * m.element.c[j, k]
-    m.element.level[j] = t.piece[i, 1] + h * m.element.c[j, 0]
+    m.element.level[j] = t.piece.level[i] + h * m.element.c[j, 0]
     for first in range(1, n):
         for k in range(n - 1, first - 1, -1):
             m.element.c[j, k - 1] = m.element.c[j, k - 1] + h * m.element.c[j, k]
-    m.element.place[j] = t.piece[i, 0] + h
+    m.element.place[j] = t.piece.begin[i] + h
     last = len(t.piece) - 1
-    m.element.until[j] = t.piece[i + 1, 0] - m.element.place[j] if i < last else h - h
+    m.element.until[j] = t.piece.begin[i + 1] - m.element.place[j] if i < last else h - h
+    if len(t.tilt) > 0:
+        m.element.c[j, 0] = m.element.c[j, 0] + m.element.lean[j]
+
+
+@jit
+def depart(t: ElementTables, m: ElementsState[ElementState], j: int, w: Scalar) -> None:
+    """Put element j on the curve for a move from the input w: at its z/width, or with a tilted drive as far from the
+    limit there, over the largest limit."""
+    s: Scalar = m.element.s[j]
+    if len(t.tilt) > 0:
+        s = s - (w - t.tilt.top[j]) * t.element.inverse_width[j] * t.tilt.lean[j]
+    put(t, m, j, s)
 
 
 @jit
@@ -197,8 +222,10 @@ def unload(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
     m.turned[0] = w
     m.upward[0] = 1
     for j in range(len(t.element)):
-        m.element.high[j] = m.element.low[j] = w - w
-        put(t, m, j, m.element.high[j])
+        m.element.s[j] = m.element.low[j] = w - w
+        if len(t.tilt) > 0:
+            m.element.s[j] = m.element.lean[j] = t.tilt.lean[j]
+        depart(t, m, j, w)
 
 
 @jit
@@ -207,17 +234,18 @@ def turn(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
     way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
     for j in range(len(t.element)):
         more, _ = gained(t, m, j, way * t.element.inverse_width[j])
-        high = m.element.high[j] + more
-        part = high - m.element.high[j]
-        low = m.element.low[j] + ((m.element.high[j] - (high - part)) + (more - part))
+        high = m.element.s[j] + more
+        part = high - m.element.s[j]
+        low = m.element.low[j] + ((m.element.s[j] - (high - part)) + (more - part))
         whole = high + low
         m.element.low[j] = whole - high - low
-        m.element.high[j] = -whole
-        last = t.piece[len(t.piece) - 1, 1]
+        m.element.s[j] = -whole
+        last = t.piece.level[len(t.piece) - 1]
         if whole > last or whole < -last:
-            m.element.high[j] = -last if whole > last else last
+            m.element.s[j] = -last if whole > last else last
             m.element.low[j] = whole - whole
-        put(t, m, j, m.element.high[j])
+        m.element.lean[j] = -m.element.lean[j]
+        depart(t, m, j, w)
     m.turned[0] = w
     m.upward[0] = 1 - m.upward[0]
 
@@ -230,8 +258,10 @@ def joined(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> tuple
     slope: Scalar = total
     for j in range(len(t.element)):
         more, steep = gained(t, m, j, way * t.element.inverse_width[j])
-        total = total + t.element.amplitude[j] * (m.element.high[j] + more + m.element.low[j])
+        total = total + t.element.amplitude[j] * (m.element.s[j] + more + m.element.low[j])
         slope = slope + t.element.weight[j] * steep
+    if len(t.tilt) > 0:
+        total = total - (t.base[0] if m.upward[0] else -t.base[0])
     return (total if m.upward[0] else -total), slope
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from hystgen.arithmetic.factors import factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
-from hystgen.effects.bouc_wen.compensator import drifted
-from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements
+from hystgen.effects.bouc_wen.compensator import drifted, piece_at
+from hystgen.effects.bouc_wen.model import Elements as Effect
 from hystgen.effects.bouc_wen.pieces import CurvePieces, pieces
 from hystgen.effects.plays import (
     Elements,
@@ -25,8 +25,8 @@ from hystgen.effects.plays import (
     FixedElementState,
     FixedElementTables,
     FixedPiece,
+    Tilt,
 )
-from hystgen.plays.slots import Reals
 
 UNIT = 44
 """Bits of places and values."""
@@ -52,8 +52,9 @@ FARTHEST = 2 ** (62 - SUMMED)
 ALLOWED = 2.0**-30
 """Error allowed for the curve: about that of a slope with `SLOPE` bits over a quarter of a width."""
 
-FAR = 2**49
-"""[2^-44 widths] Largest distance: 32 widths, behind which the curve is level within `ALLOWED`, from any place."""
+WIDTHS = 127
+"""[widths] Largest distance, by the bits of a number to be multiplied; behind 32, the curve is level within `ALLOWED`,
+from any place. Derived."""
 
 
 @functools.cache
@@ -61,9 +62,9 @@ def _pieces(exponent: float, balance: float) -> CurvePieces:
     return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
 
 
-def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straight: float) -> FixedElementTables:
-    """Tables for inputs in steps of `step` and a sum in steps of `unit`, straight over a distance. Raises
-    OverflowError."""
+def of(effect: Effect, ends: tuple[float, float], step: float, unit: float, straight: float) -> FixedElementTables:
+    """Tables for inputs between `ends` in steps of `step` and a sum in steps of `unit`, straight over a distance.
+    Raises OverflowError."""
     found = _pieces(*effect.law)
     wide = np.diff(found.begin)
     scale = UNIT - 32 + np.frexp(wide)[1]  # lengths are powers of 2
@@ -82,13 +83,15 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straigh
         lifts = [lifted(each, 0) for each in values.tolist()]
         return [factor(each / 2.0**more) for each, more in zip(values.tolist(), lifts, strict=True)], lifts
 
-    weights, widths = np.array(effect.weights), np.array(effect.widths)
+    weights, widths, drive, lean, top = effect.tilted(*ends)
+    if np.any(lean) and np.ptp(ends) > WIDTHS * np.min(widths):
+        raise OverflowError(f"the range of the plays' input is more than {WIDTHS} widths of a tilted element")
     ratio = 2.0**UNIT * step / widths
     distance, distance_lift = scaled(ratio)
-    amplitude, amplitude_lift = scaled(weights * widths / unit / 2.0**UNIT)
-    weight, weight_lift = scaled(weights * step / unit / 2.0 ** (SLOPE - STEEP))
+    amplitude, amplitude_lift = scaled(weights * drive * widths / unit / 2.0**UNIT)
+    weight, weight_lift = scaled(weights * drive * step / unit / 2.0 ** (SLOPE - STEEP))
     begin, level = (np.rint(np.ldexp(each, UNIT)).astype(np.int64).tolist() for each in (found.begin, found.level))
-    far = np.minimum(np.floor(FAR / ratio), 2**40).astype(np.int64).tolist()
+    far = np.minimum(np.floor(WIDTHS * 2.0**UNIT / ratio), 2**40).astype(np.int64).tolist()
     level_on = [[0] * DEGREE]  # behind the last piece
     pieces_of = zip(
         begin, level, [*share, (0, 21)], [*up.tolist(), *level_on], [*back.tolist(), *level_on],
@@ -96,32 +99,23 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straigh
     )
     elements = zip(distance, amplitude, weight, far, distance_lift, amplitude_lift, weight_lift, strict=True)
     most = math.floor(min(straight / step, FARTHEST))
-    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), most)
+    leans = np.rint(np.ldexp(lean / drive, SLOPE)).astype(np.int64).tolist()
+    tilt = [*zip(leans, np.rint(top / step).astype(np.int64).tolist(), strict=True)] if np.any(lean) else []
+    base = np.rint([weights * widths @ lean / unit]).astype(np.int64)
+    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), Tilt.of(tilt), base, most)
 
 
-def error(effect: BoucWenElements | DahlElements) -> float:
-    """Bound on the error of the sum of the elements, output units."""
+def error(effect: Effect, low: float, high: float) -> float:
+    """Bound on the error of the sum of the elements, output units, for inputs within a range."""
     found = _pieces(*effect.law)
-    size = float(np.abs(effect.weights) @ np.array(effect.widths))
+    weights, widths, drive, lean, _ = effect.tilted(low, high)
     rounded = 2.0**-SLOPE * DEGREE
-    return size * drifted(effect.law[0], found.error + rounded, found.slip + 2.0 * rounded)
+    slip = found.slip + 2.0 * rounded + 2.0**-SLOPE * (1.0 + (high - low) / widths) * (lean != 0.0)
+    each = [drifted(effect.law[0], found.error + rounded, x) for x in slip.tolist()]
+    return float(np.abs(weights) * widths * drive @ np.array(each))
 
 
 # ---------------------------------------------------------------- elements.c
-
-
-@jit
-def piece_at(begins: Reals, x: int) -> int:
-    """The piece in which a place or a value of the curve lies, given where pieces begin."""
-    low = 0
-    high = len(begins)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x < begins[middle]:
-            high = middle
-        else:
-            low = middle
-    return low
 
 
 @jit
@@ -162,15 +156,17 @@ def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x
         return times(x, slope, SLOPE), steep
     i = piece_at(t.piece.begin, m.element.place[j] + x)
     on = m.element.place[j] + x - t.piece.begin[i]
-    if i == len(t.piece) - 1:
-        return t.piece.level[i] - m.element.level[j], 0
     h = share_of(on, t.piece.scale[i])
     slope = t.piece.up[i, n - 1]
     steep = slope >> STEEP
     for k in range(n - 2, -1, -1):
         slope = t.piece.up[i, k] + part(slope, h)
         steep = part(steep, h) + (slope >> STEEP)
-    return t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j], steep
+    more = t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j]
+    if len(t.tilt) > 0:
+        steep = steep + (m.element.lean[j] >> STEEP)
+        more = more + times(x, m.element.lean[j], SLOPE)
+    return more, steep
 
 
 @jit
@@ -197,6 +193,18 @@ def put(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, s: i
     m.element.place[j] = t.piece.begin[i] + x
     m.element.scale[j] = t.piece.scale[i]
     m.element.until[j] = t.piece.begin[i + 1] - m.element.place[j] if i < last else 0
+    if len(t.tilt) > 0:
+        m.element.c[j, 0] = m.element.c[j, 0] + m.element.lean[j]
+
+
+@jit
+def go_on(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, w: int) -> None:
+    """Put element j on the curve for a move from the input w: at its z/width, or with a tilted drive as far from the
+    limit there, over the largest limit."""
+    s = m.element.s[j]
+    if len(t.tilt) > 0:
+        s = s - times(distance(t, j, w - t.tilt.top[j]), t.tilt.lean[j], SLOPE)
+    put(t, m, j, s)
 
 
 @jit
@@ -224,7 +232,10 @@ def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -
     m.upward[0] = 1
     for j in range(len(t.element)):
         m.element.s[j] = 0
-        put(t, m, j, 0)
+        if len(t.tilt) > 0:
+            m.element.lean[j] = t.tilt.lean[j]
+            m.element.s[j] = times(1 << UNIT, m.element.lean[j], SLOPE)
+        go_on(t, m, j, w)
     depart(t, m, w, 0)
 
 
@@ -236,7 +247,8 @@ def turn(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> 
     for j in range(len(t.element)):
         s = m.element.s[j] + gained(t, m, j, distance(t, j, way))[0]
         m.element.s[j] = -min(max(s, -last), last)
-        put(t, m, j, m.element.s[j])
+        m.element.lean[j] = -m.element.lean[j]
+        go_on(t, m, j, w)
     m.turned[0] = w
     m.upward[0] = 1 - m.upward[0]
     depart(t, m, w, m.asked[0] + m.slope[0] * (w - m.found[0]))
@@ -254,6 +266,8 @@ def approach(t: FixedElementTables, m: ElementsState[FixedElementState], w: int)
         s = m.element.s[j] + more
         total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
         slope = slope + sloped(t, j, steep)
+    if len(t.tilt) > 0:
+        total = total - (t.base[0] if m.upward[0] else -t.base[0])
     m.found[0] = w
     m.asked[0] = total if m.upward[0] else -total
     m.slope[0] = slope

@@ -132,6 +132,12 @@ class _ParallelElements(Effect):
         """t_j, by which the drive of each element is tilted."""
         return (0.0,) * len(self.weights)
 
+    def tilted(self, low: float, high: float) -> tuple[Array, Array, Array, Array, Array]:
+        """Weights, widths, largest drives `1 + t_j w` in a range, their changes over a width, and the w of each."""
+        weights, widths, tilts = map(np.array, (self.weights, self.widths, self.leans))
+        top = np.where(tilts > 0.0, high, low)
+        return weights, widths, 1.0 + tilts * top, tilts * widths, top
+
     def parallel(self, w: Array) -> Array:
         """`sum k_j z_j` (N,), from z_j = 0 at the first sample."""
         total = np.zeros(len(w))
@@ -297,6 +303,8 @@ def _candidate(label: str, count: int, build: Callable[[Array], Effect], more: A
         starts[0], build, starts[0], tuple(starts[1:]), amounts=tuple(range(0, 2 * count, 2)),
     )
 
+
+Elements = BoucWenElements | DahlElements | DuhemElements
 
 SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements, DuhemElements)
 

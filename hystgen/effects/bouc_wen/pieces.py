@@ -50,16 +50,30 @@ class CurvePieces(NamedTuple):
     slip: float
 
 
-def largest(width: float, exponent: float, balance: float, span: float) -> float:
-    """Largest s of an element whose input stays within `span`, after any history from rest: S, which comes after a move
-    over the span from s = -S."""
-    above, below = halves(exponent, balance)
-    s = 0.0
-    while True:
-        more = reach(above, below, place_of(above, below, -s) + span / width)
-        if not more > s + 1e-15:
-            return more
-        s = more
+def extremes(
+    shape: tuple[float, float], law: tuple[float, float], low: float, high: float
+) -> tuple[tuple[float, float], float, float]:
+    """Of an element with a `shape`, width and tilt, whose input stays within a range: z at the largest input and -z at
+    the smallest after a move there from rest at the other end, which no other history exceeds anywhere on the way;
+    largest |z|, with `|tilt| width^2`; and the largest change of z per change of the input, right after a reversal."""
+    (width, tilt), (exponent, balance) = shape, law
+    span, ends, most, steepest = (high - low) / width, [], 0.0, 1.0
+    for way, end in ((1.0, low), (-1.0, high)):
+        lean = way * tilt * width
+        rest = 1.0 + tilt * end - lean
+
+        def moved(x: float) -> float:
+            return rest * -math.expm1(-x) + lean * x  # noqa: B023
+
+        if not tilt:
+            s = reach(*halves(exponent, balance), span)
+            most, steepest = s, 1.0 + (2.0 * balance - 1.0) * s**exponent
+        else:
+            peaks = [min(max(math.log(-rest / (k * lean)), 0.0), span) if lean < 0.0 else span for k in (1.0, 2.0)]
+            s, most = moved(span), max(most, moved(peaks[0]))
+            steepest = max(steepest, *(rest + lean * (1.0 + x) + moved(x) for x in (0.0, peaks[1])))
+        ends.append(width * s)
+    return (ends[0], ends[1]), width * (most + abs(tilt) * width), steepest
 
 
 @functools.lru_cache(maxsize=16)
