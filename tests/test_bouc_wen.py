@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import hystgen
 from hystgen import plants
 from hystgen.basics import jit
-from hystgen.basics.problems import ParameterError
+from hystgen.basics.problems import EffectsError, ParameterError
 from hystgen.cascade import PI, Cascade
 from hystgen.chain.chain import Chain
 from hystgen.diagnosis.data.items import Item
@@ -237,10 +237,6 @@ REFUSED = {
     "shape: dahl, weights: [1]": "widths: is missing",
     "shape: duhem, weights: [1], widths: [1]": "tilts: is missing",
     "shape: duhem, weights: [1], widths: [1], tilts: [0, 0]": "tilts: has 2 values for 1 in weights; give as many as",
-    "shape: duhem, weights: [1], widths: [3], tilts: [-0.25]":
-        "tilts[0]: must be above -0.25, not -0.25: for inputs w = 0 .. 1, 1 + tilt w has to exceed |tilt| times the "
-        "width",
-    "shape: duhem, weights: [1, 1], widths: [1, 0.5], tilts: [0.99, 2]": "tilts[1]: must be below 2, not 2: for",
 }
 
 
@@ -252,6 +248,24 @@ def test_wrong_keys_are_refused(keys: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError) as caught:
         hystgen.load(path)
     assert f"model.effects[0].{REFUSED[keys]}" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ("weights: [1], widths: [3], tilts: [-0.25]", "tilts[0] must be above -0.25, not -0.25: for inputs of the "
+         "plays w = 0 .. 1, 1 + tilt w has to exceed |tilt| times the width"),
+        ("weights: [1, 1], widths: [1, 0.5], tilts: [0.99, 2]", "tilts[1] must be below 2, not 2: for"),
+        ("weights: [-0.7], widths: [0.1], tilts: [-0.3]", "right after a turn the output falls as the drive rises"),
+    ],
+)
+def test_tilts_without_a_limit_or_an_inverse_are_refused_at_emission(keys: str, said: str, tmp_path: Path) -> None:
+    head = "hystgen: 1\nname: x\nsample_time: 1.0\ninput_range: [0, 1]\nmodel:\n  pi: {thresholds: [0], weights: [1]}\n"
+    path = tmp_path / "x.yaml"
+    path.write_text(f"{head}  effects: [{{name: bouc_wen, shape: duhem, {keys}}}]\n")
+    with pytest.raises(EffectsError) as caught:
+        hystgen.emit(hystgen.load(path), tmp_path)
+    assert said in str(caught.value)
 
 
 # In the C ----------------------------------------------------------------------------------------------------

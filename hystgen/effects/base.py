@@ -277,8 +277,8 @@ class Effect(BaseModel):
         """Contradictions between parameters, as (keys, message); `thresholds`: of the model, None if unknown."""
         yield from ()
 
-    def problems_within(self, low: float, high: float) -> Iterator[Problem]:
-        """Contradictions between parameters and the range of the input of the plays, as (keys, message)."""
+    def problems_within(self, low: float, high: float) -> Iterator[str]:
+        """Contradictions between parameters and the range of the input of the plays."""
         yield from ()
 
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:

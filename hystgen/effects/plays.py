@@ -45,7 +45,6 @@ NEWTON_TRIES = 8
 enough on smooth references, and 6 after jumps, where 4 are too few and cost 20 tries (benchmarks/chosen_numbers.py
 tries)."""
 
-
 SECANTS = 10
 """Tries of a search in fixed point by secants, before it starts to halve the remaining interval. Set by:
 benchmarks/chosen_numbers.py secants. 2 to 4 are enough on smooth references, 9 after jumps; with 8, some take 25."""
@@ -124,6 +123,7 @@ class FixedElementState(Struct):
     """An element in parallel with the plays, at the last turn of its input."""
 
     s: Int64 = note("z/width in the direction of the input, over a tilted drive's limit plus `lean`,")
+    low: Literal = note("0")
     place: Int64 = note("on the curve,")
     level: Int64 = note("the curve's value there,")
     until: Int64 = note("the distance to the end of its piece,")
@@ -147,6 +147,7 @@ class Tilt(Struct):
 
     lean: Narrow
     top: Play
+    rest: Literal = note("z/width at rest, plus `lean`")
 
 
 class FixedPiece(Struct):
@@ -204,6 +205,13 @@ class ElementsState(NamedTuple, Generic[E]):
     departs: Counts
     element: E
 
+    @classmethod
+    def of(cls, elements: E, dtype: Any) -> ElementsState[E]:
+        """Memory of the given elements."""
+        turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
+        upward, departs = np.ones((2, 1), np.int64)
+        return cls(turned, upward, found, asked, slope, steep, departs, elements)
+
 
 class ElementTables(NamedTuple):
     """Constants of elements (k,) in parallel with the plays, which follow one curve in pieces (K + 1,); `tilt` (k,) or
@@ -217,15 +225,12 @@ class ElementTables(NamedTuple):
     @classmethod
     def none(cls, dtype: Any) -> ElementTables:
         """The tables of a model without elements."""
-        return cls(CurvePiece.zeros(1, dtype), ElementNumbers.zeros(0, dtype), Tilt.zeros(0, dtype), np.zeros(1, dtype))
+        element, tilt = ElementNumbers.zeros(0, dtype), Tilt.zeros(0, dtype)
+        return cls(CurvePiece.zeros(1, dtype), element, tilt, np.zeros(1, dtype))
 
     def memory(self) -> ElementsState[ElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        dtype = self.base.dtype
-        turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
-        one = np.ones(1, np.int64)
-        elements = ElementState.zeros(len(self.element), dtype)
-        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
+        return ElementsState.of(ElementState.zeros(len(self.element), self.base.dtype), self.base.dtype)
 
 
 class FixedElementTables(NamedTuple):
@@ -245,10 +250,7 @@ class FixedElementTables(NamedTuple):
 
     def memory(self) -> ElementsState[FixedElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        turned, found, asked, slope, steep = np.zeros((5, 1), np.int64)
-        one = np.ones(1, np.int64)
-        elements = FixedElementState.zeros(len(self.element))
-        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
+        return ElementsState.of(FixedElementState.zeros(len(self.element)), np.int64)
 
 
 class MovingTables(NamedTuple):
@@ -411,12 +413,13 @@ class PlaysPart(Generic[T, F]):
 
 
 class ParallelTerms(NamedTuple):
-    """Elements (k,) in parallel with the plays: weights, largest |z| and rest of a sum (`most`), z at the largest input
-    (`ends` (k, 2): and -z at the smallest) after a move across the range from rest, smallest change of z per change of
-    the input, not above 0 (`flattest`), the largest (`steepest`), and of that per change of the input (`bend`); `memory`: the elements in double precision;
-    `tables`: their constants in a data type; `error`: bound on the error of their sum in a data type, in the C (True)
-    or of the law in double precision; `coded`: their constants in fixed point for steps of the input and of the sum,
-    and the error of the sum allowed where it is computed along its slope; `coded_error`: bound on its other errors."""
+    """Elements (k,) in parallel with the plays: weights; largest |z| (`most`); -z at the smallest and z at the largest
+    input after a move across the range from rest (`ends` (k, 2)); smallest and largest change of z per change of the
+    input, the smallest if below 0 (`flattest`, `steepest`), and largest change of that (`bend`); `memory`: the elements
+    in double precision; `tables`: their constants in a data type; `error`: bound on the error of their sum in a data
+    type, in the C (True) or of the law in double precision; `coded`: their constants in fixed point for steps of the
+    input and of the sum, and the error of the sum allowed where it is computed along its slope; `coded_error`: bound on
+    its other errors."""
 
     weights: Array
     most: Array

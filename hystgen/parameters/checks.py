@@ -458,8 +458,7 @@ class _Checker:
             if first != (made.name, path_text(path)):
                 said = f"sets how the plays move, and so does {printable(first[0])} (in {first[1]}); keep one of them"
                 self.add((*path, "name"), f"{printable(made.name)} {said}")
-        ends = None if self.at(("model", "memoryless")) else self.get("input_range")  # else emission checks it
-        for keys, message in (*made.problems(self._thresholds()), *(made.problems_within(*ends) if ends else ())):
+        for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)
         self.effects.append(made)
 

@@ -445,7 +445,7 @@ def output_span(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, 
     range. At the largest input so far z is 0, as after `settle`, or above, at most as large as after a full sweep."""
     low, high = (settled(static, effects, end) for end in static.play_range)
     found = (np.maximum(each.weights, 0.0) @ each.ends for each in moving.parallel(static, effects))
-    above, below = sum(found, start=np.zeros(2)).tolist()
+    below, above = sum(found, start=np.zeros(2)).tolist()
     return low - below, high + above
 
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hystgen.arithmetic.factors import factor
-from hystgen.basics.problems import path_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain.parts import BENDS, ELEMENTS, MOVES
 from hystgen.compensator.fixed_tables import FixedCurve, reciprocal
@@ -97,7 +96,7 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     joining = [effect for effect in effects if effect.joins_plays()]
     wrong = [(each, found) for each in joining for found in each.problems_within(*static.play_range)]
     if wrong:
-        yield from ((effect, f"{path_text(keys)}: {message}") for effect, (keys, message) in wrong)
+        yield from wrong
         return
     if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
         falling = -parallel_slopes(static, joining)[0]

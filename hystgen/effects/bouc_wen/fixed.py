@@ -15,8 +15,8 @@ import numpy as np
 from hystgen.arithmetic.factors import factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
-from hystgen.effects.bouc_wen.compensator import drifted, piece_at
-from hystgen.effects.bouc_wen.model import Elements as Effect
+from hystgen.effects.bouc_wen.compensator import drifted, functions
+from hystgen.effects.bouc_wen.model import ParallelElements
 from hystgen.effects.bouc_wen.pieces import CurvePieces, pieces
 from hystgen.effects.plays import (
     Elements,
@@ -62,7 +62,9 @@ def _pieces(exponent: float, balance: float) -> CurvePieces:
     return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
 
 
-def of(effect: Effect, ends: tuple[float, float], step: float, unit: float, straight: float) -> FixedElementTables:
+def of(
+    effect: ParallelElements, ends: tuple[float, float], step: float, unit: float, straight: float
+) -> FixedElementTables:
     """Tables for inputs between `ends` in steps of `step` and a sum in steps of `unit`, straight over a distance.
     Raises OverflowError."""
     found = _pieces(*effect.law)
@@ -99,13 +101,13 @@ def of(effect: Effect, ends: tuple[float, float], step: float, unit: float, stra
     )
     elements = zip(distance, amplitude, weight, far, distance_lift, amplitude_lift, weight_lift, strict=True)
     most = math.floor(min(straight / step, FARTHEST))
-    leans = np.rint(np.ldexp(lean / drive, SLOPE)).astype(np.int64).tolist()
-    tilt = [*zip(leans, np.rint(top / step).astype(np.int64).tolist(), strict=True)] if np.any(lean) else []
+    leans, tops = (np.rint(each).astype(np.int64) for each in (np.ldexp(lean / drive, SLOPE), top / step))
+    tilt = zip(leans.tolist(), tops.tolist(), (leans << UNIT - SLOPE).tolist(), strict=True) if np.any(lean) else ()
     base = np.rint([weights * widths @ lean / unit]).astype(np.int64)
     return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), Tilt.of(tilt), base, most)
 
 
-def error(effect: Effect, low: float, high: float) -> float:
+def error(effect: ParallelElements, low: float, high: float) -> float:
     """Bound on the error of the sum of the elements, output units, for inputs within a range."""
     found = _pieces(*effect.law)
     weights, widths, drive, lean, _ = effect.tilted(low, high)
@@ -119,9 +121,9 @@ def error(effect: Effect, low: float, high: float) -> float:
 
 
 @jit
-def share_of(x: int, scale: int) -> int:
+def share_of(pieces: FixedPiece | FixedElementState, i: int, x: int) -> int:
     """A distance x >= 0 from the begin of a piece, over its length, with 31 bits."""
-    return min(x >> scale, 2**31 - 1)
+    return min(x >> pieces.scale[i], 2**31 - 1)
 
 
 @jit
@@ -137,74 +139,6 @@ def distance(t: FixedElementTables, j: int, way: int) -> int:
     inside = min(max(way, -far), far)
     by = t.element.distance
     return times(inside << t.element.distance_lift[j], by.mantissa[j], by.shift[j])
-
-
-@jit
-def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x: int) -> tuple[int, int]:
-    """Change of s of element j over the distance x since its last turn, and the curve's slope there without its `STEEP`
-    lowest bits; backwards the curve goes on straight."""
-    n = m.element.c.shape[1]
-    if x < 0:
-        return times(x, m.element.c[j, 0], SLOPE), m.element.c[j, 0] >> STEEP
-    if x < m.element.until[j]:
-        h = share_of(x, m.element.scale[j])
-        slope = m.element.c[j, n - 1]
-        steep = slope >> STEEP
-        for k in range(n - 2, -1, -1):
-            slope = m.element.c[j, k] + part(slope, h)
-            steep = part(steep, h) + (slope >> STEEP)
-        return times(x, slope, SLOPE), steep
-    i = piece_at(t.piece.begin, m.element.place[j] + x)
-    on = m.element.place[j] + x - t.piece.begin[i]
-    h = share_of(on, t.piece.scale[i])
-    slope = t.piece.up[i, n - 1]
-    steep = slope >> STEEP
-    for k in range(n - 2, -1, -1):
-        slope = t.piece.up[i, k] + part(slope, h)
-        steep = part(steep, h) + (slope >> STEEP)
-    more = t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j]
-    if len(t.tilt) > 0:
-        steep = steep + (m.element.lean[j] >> STEEP)
-        more = more + times(x, m.element.lean[j], SLOPE)
-    return more, steep
-
-
-@jit
-def put(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, s: int) -> None:
-    """Put element j at the value s of the curve."""
-    n = m.element.c.shape[1]
-    last = len(t.piece) - 1
-    i = piece_at(t.piece.level, s)
-    g = times((s - t.piece.level[i]) << t.piece.lift[i], t.piece.share.mantissa[i], t.piece.share.shift[i])
-    g = min(g, 2**31 - 1)
-    slope = t.piece.back[i, n - 1]
-    for k in range(n - 2, -1, -1):
-        slope = t.piece.back[i, k] + part(slope, g)
-    h = min(max((slope * g + 2 ** (BACK - 1)) >> BACK, 0), 2**31 - 1)
-    x = h << t.piece.scale[i]
-    for k in range(n):
-        m.element.c[j, k] = t.piece.up[i, k]
-    for k in range(n - 1, 0, -1):  # the slope at h, then the other coefficients
-        m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
-    m.element.level[j] = t.piece.level[i] + times(x, m.element.c[j, 0], SLOPE)
-    for first in range(1, n):
-        for k in range(n - 1, first - 1, -1):
-            m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
-    m.element.place[j] = t.piece.begin[i] + x
-    m.element.scale[j] = t.piece.scale[i]
-    m.element.until[j] = t.piece.begin[i + 1] - m.element.place[j] if i < last else 0
-    if len(t.tilt) > 0:
-        m.element.c[j, 0] = m.element.c[j, 0] + m.element.lean[j]
-
-
-@jit
-def go_on(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, w: int) -> None:
-    """Put element j on the curve for a move from the input w: at its z/width, or with a tilted drive as far from the
-    limit there, over the largest limit."""
-    s = m.element.s[j]
-    if len(t.tilt) > 0:
-        s = s - times(distance(t, j, w - t.tilt.top[j]), t.tilt.lean[j], SLOPE)
-    put(t, m, j, s)
 
 
 @jit
@@ -226,52 +160,55 @@ def depart(t: FixedElementTables, m: ElementsState[FixedElementState], w: int, t
 
 
 @jit
+def back(
+    t: FixedElementTables, m: ElementsState[FixedElementState], i: int, j: int, s: int
+) -> tuple[int, int]:
+    """The distance from the begin of piece i at which the curve is s, and its share of the piece's length, by whose
+    scale element j goes on."""
+    g = times((s - t.piece.level[i]) << t.piece.lift[i], t.piece.share.mantissa[i], t.piece.share.shift[i])
+    g = min(g, 2**31 - 1)
+    slope = t.piece.back[i, DEGREE - 1]
+    for k in range(DEGREE - 2, -1, -1):
+        slope = t.piece.back[i, k] + part(slope, g)
+    h = min(max((slope * g + 2 ** (BACK - 1)) >> BACK, 0), 2**31 - 1)
+    m.element.scale[j] = t.piece.scale[i]
+    return h << t.piece.scale[i], h
+
+
+@jit(inline=True)
+def by_slope(x: int, slope: int) -> int:
+    """x times a slope."""
+    return times(x, slope, SLOPE)
+
+
+@jit(inline=True)
+def steep(slope: int) -> int:
+    """A slope without its `STEEP` lowest bits."""
+    return slope >> STEEP
+
+
+@jit
+def amount(t: FixedElementTables, j: int, s: int) -> int:
+    """What element j contributes to the sum."""
+    size = t.element.amplitude
+    return times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j]
+
+
+summed, turned, unloaded = functions(part, by_slope, steep, share_of, back, distance, amount, sloped)
+
+
+@jit
 def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
     """Bring every element to rest at z = 0, with its input at w."""
-    m.turned[0] = w
-    m.upward[0] = 1
-    for j in range(len(t.element)):
-        m.element.s[j] = 0
-        if len(t.tilt) > 0:
-            m.element.lean[j] = t.tilt.lean[j]
-            m.element.s[j] = times(1 << UNIT, m.element.lean[j], SLOPE)
-        go_on(t, m, j, w)
+    unloaded(t, m, w)
     depart(t, m, w, 0)
 
 
 @jit
 def turn(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
     """Turn every element at the input w: its s changes sign."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    last = t.piece.level[len(t.piece) - 1]
-    for j in range(len(t.element)):
-        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))[0]
-        m.element.s[j] = -min(max(s, -last), last)
-        m.element.lean[j] = -m.element.lean[j]
-        go_on(t, m, j, w)
-    m.turned[0] = w
-    m.upward[0] = 1 - m.upward[0]
+    turned(t, m, w)
     depart(t, m, w, m.asked[0] + m.slope[0] * (w - m.found[0]))
-
-
-@jit
-def approach(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
-    """Compute the sum of the elements with their input at w, and its slope."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    total = 0
-    slope = 0
-    for j in range(len(t.element)):
-        more, steep = gained(t, m, j, distance(t, j, way))
-        size = t.element.amplitude
-        s = m.element.s[j] + more
-        total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
-        slope = slope + sloped(t, j, steep)
-    if len(t.tilt) > 0:
-        total = total - (t.base[0] if m.upward[0] else -t.base[0])
-    m.found[0] = w
-    m.asked[0] = total if m.upward[0] else -total
-    m.slope[0] = slope
-    m.departs[0] = 0
 
 
 @jit
@@ -280,7 +217,9 @@ def joined(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -
     computed there if that is not near or they have turned since."""
     on = w - m.found[0]
     if on != 0 and (m.departs[0] or on > t.straight or on < -t.straight):
-        approach(t, m, w)
+        m.found[0] = w
+        m.asked[0], m.slope[0] = summed(t, m, w)
+        m.departs[0] = 0
         on = 0
     return m.asked[0] + m.slope[0] * on, 0
 

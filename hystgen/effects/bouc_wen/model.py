@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
@@ -45,9 +44,6 @@ STARTS = 5
 MOST_TILT = 0.98
 """[1] Largest tilt tried, as a share of that at which z has no limit at one end of the drive range."""
 
-LEAST_DRIVE = 0.02
-"""[1] Smallest `dz/dw` at z = w = 0 tried, over that in the middle of the drive range, which may be far from 0."""
-
 DAHL = "bouc_wen, dahl"
 
 
@@ -65,43 +61,43 @@ def place_of(above: Half, below: Half, s: float) -> float:
     return -distance(below, -s) if s < 0.0 else distance(above, s)
 
 
+def at_rest(w: float, width: float, tilt: float) -> Array:
+    """Memory of an element at rest: its direction, its input w at the last turn and now, and where it began to move
+    there: its place on the curve or, if tilted, s, which is `z/width + tilt width` in its direction."""
+    return np.array([1.0, w, w, tilt * width])
+
+
 @jit
-def value(
-    above: Half, below: Half, begin: float, way: float, ends: tuple[float, float], shape: tuple[float, float]
-) -> float:
-    """s of an element, `z/width + tilt width` in the direction `way`, after a move between `ends` since its last turn,
-    there with its place on the curve at `begin` or, if tilted, with this s. `shape`: its width and tilt."""
-    (turned, w), (width, tilt) = ends, shape
-    x = way * (w - turned) / width
+def reached(m: Array, w: float, width: float, tilt: float, above: Half, below: Half) -> float:
+    """s of an element with its input at w, without a turn on the way."""
+    x = m[0] * (w - m[1]) / width
     if tilt == 0.0:
-        return reach(above, below, begin + x)
-    return begin - (1.0 + tilt * turned - begin) * math.expm1(-x) + tilt * (w - turned)
+        return reach(above, below, m[3] + x)
+    return float(m[3] - (1.0 + tilt * m[1] - m[3]) * math.expm1(-x) + tilt * (w - m[1]))
 
 
 @jit
-def turned_at(above: Half, below: Half, s: float, tilt: float) -> float:
-    """Where an element begins after a turn at s, which changes its sign."""
-    return place_of(above, below, -s) if tilt == 0.0 else -s
-
-
-@jit
-def element(w: Array, width: float, tilt: float, weight: float, above: Half, below: Half, total: Array) -> None:
-    """Add `weight z` to `total`, for the input `w`, from z = 0 at its first sample.
+def moved(m: Array, w: float, width: float, tilt: float, above: Half, below: Half) -> float:
+    """z/width of an element after its input has moved to w.
 
     Between turns the element follows its curve from the last turn on, so that no rounding errors accumulate over the
     samples.
     """
-    way, turned, begin = 1.0, w[0], tilt * width
+    if m[0] * (w - m[2]) < 0.0:
+        s = reached(m, m[2], width, tilt, above, below)
+        m[0], m[1], m[3] = -m[0], m[2], place_of(above, below, -s) if tilt == 0.0 else -s
+    m[2] = w
+    return float(m[0] * reached(m, w, width, tilt, above, below) - tilt * width)
+
+
+@jit
+def element(m: Array, w: Array, width: float, tilt: float, weight: float, above: Half, below: Half, out: Array) -> None:
+    """Add `weight z` to `out`, for the input `w`, from rest at its first sample."""
     for k in range(1, len(w)):
-        move = w[k] - w[k - 1]
-        if way * move < 0.0:
-            s = value(above, below, begin, way, (turned, w[k - 1]), (width, tilt))
-            begin, turned, way = turned_at(above, below, s, tilt), w[k - 1], -way
-        s = value(above, below, begin, way, (turned, w[k]), (width, tilt))
-        total[k] += weight * width * (way * s - tilt * width)
+        out[k] += weight * width * moved(m, w[k], width, tilt, above, below)
 
 
-class _ParallelElements(Effect):
+class ParallelElements(Effect):
     name: Literal["bouc_wen"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.PLAYS
@@ -119,18 +115,20 @@ class _ParallelElements(Effect):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """A problem unless there is one width for each weight."""
+        """A problem unless there is one width for each weight, and a tilt, if there are any."""
         yield from not_as_many("widths", self.widths, "weights", self.weights)
+        yield from not_as_many("tilts", self.leans, "weights", self.weights)
 
     @property
-    @abstractmethod
     def law(self) -> tuple[float, float]:
         """Exponent and balance."""
+        return 1.0, 1.0
 
     @property
     def leans(self) -> tuple[float, ...]:
         """t_j, by which the drive of each element is tilted."""
-        return (0.0,) * len(self.weights)
+        tilts: tuple[float, ...] = getattr(self, "tilts", (0.0,) * len(self.weights))
+        return tilts
 
     def tilted(self, low: float, high: float) -> tuple[Array, Array, Array, Array, Array]:
         """Weights, widths, largest drives `1 + t_j w` in a range, their changes over a width, and the w of each."""
@@ -142,7 +140,8 @@ class _ParallelElements(Effect):
         """`sum k_j z_j` (N,), from z_j = 0 at the first sample."""
         total = np.zeros(len(w))
         for weight, width, tilt in zip(self.weights, self.widths, self.leans, strict=True):
-            element(np.ascontiguousarray(w), width, tilt, weight, *halves(*self.law), total)
+            m = at_rest(float(w[0]), width, tilt)
+            element(m, np.ascontiguousarray(w), width, tilt, weight, *halves(*self.law), total)
         return total
 
     def transients(self, run: Run) -> Array:
@@ -150,7 +149,7 @@ class _ParallelElements(Effect):
         return np.asarray(np.exp(-run.travelled / np.array(self.widths)[:, None]))
 
 
-class BoucWenElements(_ParallelElements):
+class BoucWenElements(ParallelElements):
     """Bouc-Wen elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, z_j in units of the plays' input w.
 
         dz = dw (1 - (b sgn(z dw) + 1 - b) |z/width|^n)
@@ -184,27 +183,17 @@ class BoucWenElements(_ParallelElements):
             return cls(name="bouc_wen", weights=weights, widths=widths, exponent=exponent, balance=balance)
 
         more = np.array([[*np.log10(BALANCES), 0.0], [*EXPONENTS, 1.0]])
-
-        def freed(label: str, count: int) -> Candidate:
-            straight = _candidate(label, 1, build, more[:count])
-            return replace(straight, beyond=DAHL, grown=lambda x: np.append(x, more[:count, 2]))
-
-        free = [freed("bouc_wen, any balance", 1), freed("bouc_wen, any balance and exponent", 2)]
-        return free if about.speeds else []
+        labels = "bouc_wen, any balance", "bouc_wen, any balance and exponent"
+        return [_freed(label, build, more[:k]) for k, label in enumerate(labels, 1) if about.speeds]
 
 
-class DahlElements(_ParallelElements):
+class DahlElements(ParallelElements):
     """Dahl's friction elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, `dz = dw (1 - sgn(dw) z/width)`.
 
     The Bouc-Wen element with exponent and balance 1 (P. R. Dahl, A solid friction model, Aerospace Corporation, 1968).
     """
 
     shape: Literal["dahl"] = Field(description="Dahl's law: exponent 1 and balance 1")
-
-    @property
-    def law(self) -> tuple[float, float]:
-        """Exponent and balance."""
-        return 1.0, 1.0
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -226,7 +215,7 @@ class DahlElements(_ParallelElements):
         return found if about.speeds else []
 
 
-class DuhemElements(_ParallelElements):
+class DuhemElements(ParallelElements):
     """Dahl's elements with a tilted drive: `dz = dw (1 + t w) - |dw| z/width`.
 
     With `y = p w + k z` these are Duhem plants of Coleman and Hodgdon, `dy = |dw| (p w - y)/width + (c + d w) dw` with
@@ -239,28 +228,13 @@ class DuhemElements(_ParallelElements):
         description="as many as weights, t_j, 1 / input unit of the plays", examples=[[-0.005]]
     )
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """A problem unless there are one width and one tilt for each weight."""
-        yield from super().problems(thresholds)
-        yield from not_as_many("tilts", self.tilts, "weights", self.weights)
-
-    def problems_within(self, low: float, high: float) -> Iterator[Problem]:
+    def problems_within(self, low: float, high: float) -> Iterator[str]:
         """A problem for each tilt with which z would somewhere turn back while the input moves on."""
         for j, (tilt, width) in enumerate(zip(self.tilts, self.widths, strict=False)):
             room, side = (width - low, "below ") if tilt > 0.0 else (width + high, "above -")
             if not abs(tilt) * room < 1.0:
-                message = f"must be {side}{1.0 / room:.6g}, not {tilt:.6g}: for inputs w = {low:.6g} .. {high:.6g}"
-                yield ("tilts", j), f"{message}, 1 + tilt w has to exceed |tilt| times the width"
-
-    @property
-    def law(self) -> tuple[float, float]:
-        """Exponent and balance."""
-        return 1.0, 1.0
-
-    @property
-    def leans(self) -> tuple[float, ...]:
-        """t_j, by which the drive of each element is tilted."""
-        return self.tilts
+                message = f"tilts[{j}] must be {side}{1.0 / room:.6g}, not {tilt:.6g}: for inputs of the plays"
+                yield f"{message} w = {low:.6g} .. {high:.6g}, 1 + tilt w has to exceed |tilt| times the width"
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -269,15 +243,11 @@ class DuhemElements(_ParallelElements):
 
         def build(x: Array) -> DuhemElements:
             (weight,), (width,) = _elements(x[None, :2], about)
-            lean = x[2] / (half + width)  # about the middle: at 1 and -1, z has no limit at one end
-            if lean * middle > 1.0 - LEAST_DRIVE:
-                lean = (1.0 - LEAST_DRIVE) / middle
+            lean = x[2] / max(half + width, abs(middle))  # about the middle: at 1 or -1, z has no limit at one end
             tilts = (lean / (at_0 := 1.0 - lean * middle),)
             return cls(name="bouc_wen", shape="duhem", weights=(weight * at_0,), widths=(width,), tilts=tilts)
 
-        more = np.array([[-MOST_TILT, MOST_TILT, 0.0]])
-        one = _candidate("bouc_wen, duhem", 1, build, more)
-        return [replace(one, beyond=DAHL, grown=lambda x: np.append(x, 0.0))] if about.speeds else []
+        return [_freed("bouc_wen, duhem", build, np.array([[-MOST_TILT, MOST_TILT, 0.0]]))] if about.speeds else []
 
 
 def _elements(x: Array, about: About) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -304,11 +274,14 @@ def _candidate(label: str, count: int, build: Callable[[Array], Effect], more: A
     )
 
 
-Elements = BoucWenElements | DahlElements | DuhemElements
+def _freed(label: str, build: Callable[[Array], Effect], more: Array) -> Candidate:
+    """One element with further parameters than Dahl's, which begin where it is Dahl's."""
+    return replace(_candidate(label, 1, build, more), beyond=DAHL, grown=lambda x: np.append(x, more[:, 2]))
 
-SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements, DuhemElements)
+
+SHAPES: Sequence[type[ParallelElements]] = (BoucWenElements, DahlElements, DuhemElements)
 
 
 def load() -> None:
     """Compile the elements, or load them from the cache, by running them on two samples."""
-    element(np.array([0.0, 1.0]), 1.0, 0.0, 1.0, *halves(1.0, 1.0), np.zeros(2))
+    element(at_rest(0.0, 1.0, 0.0), np.array([0.0, 1.0]), 1.0, 0.0, 1.0, *halves(1.0, 1.0), np.zeros(2))

@@ -29,7 +29,6 @@ MOST_SUM = 7.5
 MOST_PIECES = 2000
 """Maximum number of pieces, a reserve: float64 takes some 100."""
 
-
 LARGEST = 1e36
 """Largest coefficient: float32 holds numbers up to 3.4e38."""
 
@@ -52,28 +51,23 @@ class CurvePieces(NamedTuple):
 
 def extremes(
     shape: tuple[float, float], law: tuple[float, float], low: float, high: float
-) -> tuple[tuple[float, float], float, float]:
-    """Of an element with a `shape`, width and tilt, whose input stays within a range: z at the largest input and -z at
-    the smallest after a move there from rest at the other end, which no other history exceeds anywhere on the way;
-    largest |z|, with `|tilt| width^2`; and the largest change of z per change of the input, right after a reversal."""
+) -> tuple[tuple[float, float], float]:
+    """Of an element with a `shape`, width and tilt, whose input stays within a range: -z at the smallest input and z at
+    the largest after a move there from rest at the other end, which no other history exceeds anywhere on the way; and
+    the largest change of z per change of the input, right after a reversal."""
     (width, tilt), (exponent, balance) = shape, law
-    span, ends, most, steepest = (high - low) / width, [], 0.0, 1.0
-    for way, end in ((1.0, low), (-1.0, high)):
-        lean = way * tilt * width
-        rest = 1.0 + tilt * end - lean
-
-        def moved(x: float) -> float:
-            return rest * -math.expm1(-x) + lean * x  # noqa: B023
-
-        if not tilt:
-            s = reach(*halves(exponent, balance), span)
-            most, steepest = s, 1.0 + (2.0 * balance - 1.0) * s**exponent
-        else:
-            peaks = [min(max(math.log(-rest / (k * lean)), 0.0), span) if lean < 0.0 else span for k in (1.0, 2.0)]
-            s, most = moved(span), max(most, moved(peaks[0]))
-            steepest = max(steepest, *(rest + lean * (1.0 + x) + moved(x) for x in (0.0, peaks[1])))
-        ends.append(width * s)
-    return (ends[0], ends[1]), width * (most + abs(tilt) * width), steepest
+    span = (high - low) / width
+    if not tilt:
+        s = reach(*halves(exponent, balance), span)
+        return (width * s, width * s), 1.0 + (2.0 * balance - 1.0) * s**exponent
+    ends, steepest = [], 0.0
+    for lean, begin in ((-tilt * width, 1.0 + tilt * high), (tilt * width, 1.0 + tilt * low)):
+        rest = begin - lean
+        peak = min(max(math.log(-0.5 * rest / lean), 0.0), span) if lean < 0.0 else span
+        moved = [lean * x - rest * math.expm1(-x) for x in (peak, span)]
+        steepest = max(steepest, begin, begin + lean * peak + moved[0])
+        ends.append(width * moved[1])
+    return (ends[0], ends[1]), steepest
 
 
 @functools.lru_cache(maxsize=16)
