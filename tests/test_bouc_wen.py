@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects import About, Effect, Run, shapes
 from hystgen.effects.bouc_wen.compensator import DEGREE, EXACT
 from hystgen.effects.bouc_wen.curve import distance, halves, size
-from hystgen.effects.bouc_wen.pieces import pieces
+from hystgen.effects.bouc_wen.pieces import extremes, pieces
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
@@ -248,6 +249,51 @@ def test_wrong_keys_are_refused(keys: str, tmp_path: Path) -> None:
     with pytest.raises(ParameterError) as caught:
         hystgen.load(path)
     assert f"model.effects[0].{REFUSED[keys]}" in str(caught.value)
+
+
+@pytest.mark.parametrize("keys", [
+    {"shape": "dahl", "widths": (2.0,)}, {"widths": (9.0,), "exponent": 2.0, "balance": 0.7},
+    {"shape": "duhem", "widths": (2.0,), "tilts": (-0.1,)}, {"shape": "duhem", "widths": (9.0,), "tilts": (0.07,)},
+    {"shape": "duhem", "widths": (1.0,), "tilts": (-0.16,)}, {"shape": "duhem", "widths": (30.0,), "tilts": (-0.027,)},
+])  # fmt: skip
+def test_no_history_exceeds_the_extremes(keys: dict[str, Any]) -> None:
+    """z and its slope after random moves within the range, and after the moves that lead to the extremes."""
+    low, high = -2.0, 5.0
+    effect = make(weights=(1.0,), **keys)
+    assert not [*effect.problems_within(low, high)]
+    (width,), (tilt,) = effect.widths, effect.leans
+    ends, steepest = extremes((width, tilt), effect.law, low, high)
+    rng, slopes, reached = np.random.default_rng(7), [], []
+    grid = np.linspace(low, high, 141)
+    begun = [[low, high], [high, low], *([low, x] for x in grid), *([high, x] for x in grid)]
+    for turns in (*begun, *(rng.uniform(low, high, 12) for _ in range(200))):
+        w = np.concatenate([[turns[0]], *(np.linspace(a, b, 60)[1:] for a, b in itertools.pairwise(turns))])
+        back = np.clip(w[-1] - 1e-6 * np.sign(w[-1] - w[-2]), low, high)
+        z = effect.parallel(np.append(w, back))
+        slopes.append((z[-1] - z[-2]) / (back - w[-1]) if back != w[-1] else 0.0)
+        reached.append((-z[:-1][w == low], z[:-1][w == high]))
+    for end, found in zip(ends, zip(*reached, strict=True), strict=True):
+        assert max(float(np.max(each, initial=0.0)) for each in found) == pytest.approx(end, rel=1e-12)
+    assert max(slopes) <= steepest + 1e-6
+    assert max(slopes) == pytest.approx(steepest, rel=2e-3)
+
+
+@pytest.mark.parametrize("effect", [
+    "weights: [0.3], widths: [6]", "shape: dahl, weights: [0.3], widths: [3]",
+    "shape: duhem, weights: [0.3], widths: [3], tilts: [-0.1]",
+    "shape: duhem, weights: [-0.1], widths: [3], tilts: [0.1]",
+])  # fmt: skip
+def test_the_output_range_is_reached_and_not_exceeded(effect: str) -> None:
+    """From rest at one end of the range, in one move to the other: no history leads further."""
+    one = model("one", f"name: bouc_wen, {effect}")
+    limits = one.compiled("float64").tables.limits.output
+    low, high = one.cascade.input_range
+    rng, ends = np.random.default_rng(3), []
+    for turns in ([low, high], [high, low], [low], [high], *(rng.uniform(low, high, 8) for _ in range(50))):
+        y = one.simulate(np.concatenate([[turns[0]], *(np.linspace(a, b, 40) for a, b in itertools.pairwise(turns))]))
+        ends.append((float(np.min(y)), float(np.max(y))))
+    assert min(each[0] for each in ends) == pytest.approx(float(limits.low[0]), abs=1e-9)
+    assert max(each[1] for each in ends) == pytest.approx(float(limits.high[0]), abs=1e-9)
 
 
 @pytest.mark.parametrize(

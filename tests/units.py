@@ -68,6 +68,8 @@ ANALYSED = (
     ("forgetful", "q31", "loop"),
     ("gliding", "float32", "loop"),
     ("gliding", "q15", "loop"),
+    ("sloping", "float32", "loop"),
+    ("sloping", "q31", "loop"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""
