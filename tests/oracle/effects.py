@@ -287,7 +287,7 @@ def _shim(case: Case) -> str:
         f"#ifdef {macro}_INVERSE_MAX_ERROR{ending}",
         f"#define BOUND_{macro} {macro}_INVERSE_MAX_ERROR{ending}",
         "#else",
-        f"#define BOUND_{macro} ({macro}_DRIVE_MAX - {macro}_DRIVE_MIN)",
+        f"#define BOUND_{macro} ((double){macro}_DRIVE_MAX - {macro}_DRIVE_MIN)",
         "#endif",
         f"const effects_probe_t {name}_probe = {{{', '.join(numbers)}}};",
     ]
