@@ -52,6 +52,7 @@ KINDS = (
     ("everything", "both", "q31", "loop"), ("quick", "inverse", "q31", "loop"), ("bumpy", "inverse", "q31", "loop"),
     ("viscous", "both", "q31", "loop"), ("dashpot", "both", "q31", "loop"), ("wider", "both", "float32", "loop"),
     ("forgetful", "both", "q31", "loop"),
+    ("sloping", "both", "float32", "loop"),
 )  # fmt: skip
 
 

@@ -110,26 +110,26 @@ class MovingNumbers(Struct):
 class ElementState(Struct):
     """An element in parallel with the plays, at the last turn of its input."""
 
-    s: Real = note("z/width in the direction of the input, over a tilted drive's limit plus `lean`,")
+    s: Real = note("z/width in the direction of the input, with a tilted drive plus `lean`,")
     low: Real = note("and its rounding remainder")
     place: Real = note("on the curve,")
     level: Real = note("the curve's value there,")
     until: Real = note("the distance to the end of its piece,")
     c: SevenReals = note("its coefficients from there on,")
-    lean: Real = note("and the tilt of the drive, from there on, over a width")
+    lean: Real = note("and the change of the drive over a width from there on")
 
 
 class FixedElementState(Struct):
     """An element in parallel with the plays, at the last turn of its input."""
 
-    s: Int64 = note("z/width in the direction of the input, over a tilted drive's limit plus `lean`,")
+    s: Int64 = note("z/width in the direction of the input, with a tilted drive plus `lean`,")
     low: Literal = note("0")
     place: Int64 = note("on the curve,")
     level: Int64 = note("the curve's value there,")
     until: Int64 = note("the distance to the end of its piece,")
     c: FiveInt32 = note("the coefficients of its mean slope from there on,")
     scale: UInt8 = note("the right shift to the share of the piece's length,")
-    lean: Int32 = note("and the tilt of the drive, from there on, over a width")
+    lean: Int32 = note("and the change of the drive over a width from there on")
 
 
 class CurvePiece(Struct):
@@ -143,7 +143,7 @@ class CurvePiece(Struct):
 
 
 class Tilt(Struct):
-    """Tilt of an element's drive, relative to the largest: its change over a width, and the input at the largest."""
+    """The tilted drive `1 + t w` of an element, over its largest value: change over a width, and where that is."""
 
     lean: Narrow
     top: Play
