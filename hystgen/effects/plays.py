@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from hystgen.basics.structures import (
     AnyFactor,
@@ -206,7 +206,7 @@ class ElementsState(NamedTuple, Generic[E]):
     element: E
 
     @classmethod
-    def of(cls, elements: E, dtype: Any) -> ElementsState[E]:
+    def of(cls, elements: E, dtype: DTypeLike) -> ElementsState[E]:
         """Memory of the given elements."""
         turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
         upward, departs = np.ones((2, 1), np.int64)

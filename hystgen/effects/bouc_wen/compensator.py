@@ -17,6 +17,8 @@ from hystgen.effects.plays import (
     ElementNumbers,
     Elements,
     ElementsPart,
+    ElementsState,
+    ElementState,
     ElementTables,
     FixedElementTables,
     ParallelTerms,
@@ -149,7 +151,7 @@ def functions(
         return mean, slope
 
     @jit
-    def gained(t: Any, m: Any, j: int, x: Scalar) -> tuple[Scalar, Scalar]:
+    def gained(t: ElementTables, m: ElementsState[ElementState], j: int, x: Scalar) -> tuple[Scalar, Scalar]:
         """Change of s of element j over the distance x since its last turn, and its slope there. Backwards, where a
         search may try inputs, the curve goes on straight."""
         e = m.element
@@ -168,7 +170,7 @@ def functions(
         return more, slope
 
     @jit
-    def depart(t: Any, m: Any, j: int, w: Scalar) -> None:
+    def depart(t: ElementTables, m: ElementsState[ElementState], j: int, w: Scalar) -> None:
         """Put element j on the curve for a move from the input w: at its z/width, or with a tilted drive as far from
         the limit there, over the largest limit."""
         e = m.element
@@ -193,7 +195,7 @@ def functions(
             c[j, 0] = c[j, 0] + e.lean[j]
 
     @jit
-    def unload(t: Any, m: Any, w: Scalar) -> None:
+    def unload(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
         """Bring every element to rest at z = 0, with its input at w."""
         m.turned[0] = w
         m.upward[0] = 1
@@ -205,7 +207,7 @@ def functions(
             depart(t, m, j, w)
 
     @jit
-    def turn(t: Any, m: Any, w: Scalar) -> None:
+    def turn(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
         """Turn every element at the input w. Its s changes sign: exactly, with a rounding remainder, 0 in
         fixed point."""
         way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
@@ -225,7 +227,7 @@ def functions(
         m.upward[0] = 1 - m.upward[0]
 
     @jit
-    def joined(t: Any, m: Any, w: Scalar) -> tuple[Scalar, Scalar]:
+    def joined(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> tuple[Scalar, Scalar]:
         """The sum of the elements with their input at w, and its slope."""
         way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
         total: Scalar = way - way
