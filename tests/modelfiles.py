@@ -97,6 +97,8 @@ CHAINS = {
     "gliding": chain("gliding", "name: bouc_wen, shape: dahl, weights: [-0.15], widths: [1]",
                      "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
+    "sloping": chain("sloping", "name: bouc_wen, shape: duhem, weights: [-0.2, 0.1], widths: [2, 0.7], "
+                     "tilts: [-0.06, 0.08]"),
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
     "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
                       CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n") + ALLOWED,

@@ -79,6 +79,7 @@ EVERY = [
     make("slew_limit", shape="sudden", rate=30.0, falling_rate=20.0),
     make("bouc_wen", weights=(-0.2, 0.1), widths=(0.7, 2.0), exponent=1.6, balance=1.4),
     make("bouc_wen", shape="dahl", weights=(-0.3,), widths=(0.6,)),
+    make("bouc_wen", shape="duhem", weights=(-0.3,), widths=(0.6,), tilts=(-0.1,)),
 ]
 
 
@@ -173,6 +174,7 @@ NOTHING = [
     make("noncongruent", shape="centre", amplitude=0.0, centre=1.0, width=1.0),
     make("bouc_wen", weights=(0.0, 0.0), widths=(0.7, 5e-324), exponent=1.6, balance=1.4),
     make("bouc_wen", shape="dahl", weights=(0.0,), widths=(1e30,)),
+    make("bouc_wen", shape="duhem", weights=(0.0,), widths=(2.0,), tilts=(0.1,)),
 ]
 
 
@@ -396,6 +398,10 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     )
     | st.builds(
         lambda k, d, e: {"shape": "dahl", "weights": (k, k), "widths": (d, e)}, share, positive, positive
+    )
+    | st.builds(
+        lambda k, d, t: {"shape": "duhem", "weights": (k,), "widths": (d,), "tilts": (t / d,)},
+        share, positive, st.floats(-1, 1),
     ),
 }  # fmt: skip
 

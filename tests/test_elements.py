@@ -13,7 +13,7 @@ from recordings import brute_output
 import hystgen
 from hystgen.identification import Fit, elements
 from hystgen.identification.reduction import Course
-from hystgen.plants import BoucWen, Dahl
+from hystgen.plants import BoucWen, Dahl, Duhem
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -66,6 +66,10 @@ def sharp(v: Array) -> Array:
     return BoucWen(alpha=1.5, k=0.1, D=15.0, beta=0.7, gamma=0.3, n=2.0).simulate(v)
 
 
+def sloping(v: Array) -> Array:
+    return Duhem.coleman_hodgdon(0.06, lambda x: 0.1 * x, lambda x: 0.06 + 2e-4 * x).simulate(v)
+
+
 def beside_plays(v: Array) -> Array:
     return brute_output(v, *PLAYS, 0.0) - Dahl(sigma=0.02, limit=0.3).simulate(v)
 
@@ -92,6 +96,22 @@ def test_without_noise_the_plant_is_found(
     assert np.max(np.abs(made / [weight, width, exponent, balance] - 1.0)) < 1e-4
 
 
+def test_a_duhem_plant_is_found() -> None:
+    """`y = a v + k z` with k = c - a and the tilt d/k; the tolerance of the plant's integration is left."""
+    fit = identified(sloping)
+    (found,) = fit.parameters.model.effects
+    assert held_out(fit) < 1e-4
+    assert fit.parameters.model.pi.thresholds == (0.0,)
+    made = np.array([found.weights[0], found.widths[0], found.tilts[0]])
+    assert np.max(np.abs(made / [-0.04, 1.0 / 0.06, -0.005] - 1.0)) < 1e-4
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 2e-3])
+def test_noise_does_not_tilt_dahl_s_element(noise: float) -> None:
+    (found,) = identified(friction, noise).parameters.model.effects
+    assert found.shape == "dahl"
+
+
 def test_beside_plays() -> None:
     """Thresholds come from a grid, so the plays are not exact: the element takes its part, and the error is small."""
     fit = identified(beside_plays)
@@ -102,7 +122,9 @@ def test_beside_plays() -> None:
     assert held_out(fit) < 0.5 * plain
 
 
-@pytest.mark.parametrize(("plant", "noise"), [(friction, 2e-3), (softening, 2e-3), (beside_plays, 5e-4)])
+@pytest.mark.parametrize(
+    ("plant", "noise"), [(friction, 2e-3), (softening, 2e-3), (beside_plays, 5e-4), (sloping, 2e-3)]
+)
 def test_with_noise_the_noise_is_left(plant: Plant, noise: float) -> None:
     fit = identified(plant, noise)
     assert [effect.name for effect in fit.parameters.model.effects] == ["bouc_wen"]

@@ -98,7 +98,7 @@ STILL = {
     "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
 }
 
-CONDITIONAL = ("lagging", "quick", "straight", "everything", "wider", "dilated", "forgetful", "gliding")
+CONDITIONAL = ("lagging", "quick", "straight", "everything", "wider", "dilated", "forgetful", "gliding", "sloping")
 """Chains for whose inverse no bound is known, except under a condition."""
 
 BRANCHED = ("lagging", "aged", "everything", "relaxing")

@@ -57,6 +57,7 @@ KINDS = (
     ("everything", "forward", "q31", "loop"), ("quick", "forward", "float32", "loop"),
     ("warm", "forward", "float32", "loop"), ("heated", "forward", "q31", "loop"), ("three", "forward", "q31", "loop"),
     ("gliding", "forward", "float32", "loop"), ("dashpot", "forward", "float32", "loop"),
+    ("sloping", "both", "float32", "loop"),
 )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from hystgen.diagnosis.search import forgetting, harm, hypothesis, screening, se
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
+from hystgen.plants import Duhem
 from hystgen.records import Record
 
 pytestmark = pytest.mark.thorough
@@ -50,6 +51,10 @@ def dahl(v: Array) -> Array:
 
 def bouc_wen(v: Array) -> Array:
     return 1.6 * v - 0.6 * element(v, 15.0, 0.5)
+
+
+def duhem(v: Array) -> Array:
+    return Duhem.coleman_hodgdon(0.06, lambda x: x, lambda x: 0.5 + 3e-3 * x).simulate(v)
 
 
 def plays(v: Array) -> Array:
@@ -144,6 +149,15 @@ def test_at_one_speed_no_name_takes_its_place() -> None:
     assert found.parameters.model.effects == ()
     refused = [each["refused"] for each in found.content["ranking"][0] if each["name"] in first["in_place_of"]]
     assert all(refused)
+
+
+@pytest.mark.parametrize(("stage", "shape", "tilt"), [(dahl, "dahl", 0.0), (duhem, "duhem", 3e-3 / -0.5)])
+def test_elements_are_named_with_a_tilt_where_there_is_one(stage: Stage, shape: str, tilt: float) -> None:
+    made = records(stage, (400.0, 1600.0))
+    start = hystgen.identify(made[:3], holdout=made[3:], model="pi")
+    (found,) = hystgen.diagnose(start, made[:3], holdout=made[3:]).parameters.model.effects
+    assert found.shape == shape
+    assert found.leans[0] == pytest.approx(tilt, rel=0.01)
 
 
 @pytest.mark.parametrize(("stage", "name"), [(creeping, "creep"), (lagging, "lag")])

@@ -66,6 +66,8 @@ ANALYSED = (
     ("forgetful", "float32", "loop"),
     ("forgetful", "q31", "loop"),
     ("gliding", "q15", "loop"),
+    ("sloping", "float32", "loop"),
+    ("sloping", "q31", "loop"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""

@@ -61,7 +61,6 @@ BLOCKS = 1000
 MOST_POINTS = 4000
 """Longer lines that cannot be thinned become pixels in an SVG; also the maximum number of points in a scatter plot."""
 
-
 KINDS = (".png", ".svg")
 
 

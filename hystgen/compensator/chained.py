@@ -58,7 +58,7 @@ class FrontAndPlays(Block):
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
         self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
         self.movement = None if chain.mover is None else MOVES.of(chain.mover, self.r, self.p)
-        self.elements = [ELEMENTS.of(effect, math.inf).memory for effect in chain.joining]
+        self.elements = [ELEMENTS.of(effect, *self.static.play_range).memory for effect in chain.joining]
         self.loaded = False
         self.start = np.array(pi.start)
         self.led_by: Leading | None = None

@@ -38,7 +38,6 @@ _FIRST = (
 )
 """The order in which messages and searches name effects; any others follow alphabetically."""
 
-
 BEND, LIMIT = "asymmetry", "saturation"
 """Names for what a memoryless front in `model.memoryless` can do: bend the curve, or flatten its ends. The first has no
 folder; the folder of the second is for a limit behind the plays."""

@@ -277,6 +277,10 @@ class Effect(BaseModel):
         """Contradictions between parameters, as (keys, message); `thresholds`: of the model, None if unknown."""
         yield from ()
 
+    def problems_within(self, low: float, high: float) -> Iterator[str]:
+        """Contradictions between parameters and the range of the input of the plays."""
+        yield from ()
+
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
         """Further lines of `hystgen show` about the effect in a model with these thresholds."""
         return []

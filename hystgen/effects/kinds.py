@@ -18,7 +18,6 @@ from hystgen.plays.slots import Counts
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
 
-
 B = TypeVar("B", bound=Struct)
 R = TypeVar("R", bound=Struct)
 

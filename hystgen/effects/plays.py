@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from hystgen.basics.structures import (
     AnyFactor,
@@ -19,6 +19,8 @@ from hystgen.basics.structures import (
     Int32,
     Int64,
     Literal,
+    Narrow,
+    Play,
     Real,
     SevenReals,
     Struct,
@@ -42,7 +44,6 @@ NEWTON_TRIES = 8
 """Tries of a search in floating point by Newton's method, before it starts to halve the remaining interval: 1 or 2 are
 enough on smooth references, and 6 after jumps, where 4 are too few and cost 20 tries (benchmarks/chosen_numbers.py
 tries)."""
-
 
 SECANTS = 10
 """Tries of a search in fixed point by secants, before it starts to halve the remaining interval. Set by:
@@ -109,23 +110,44 @@ class MovingNumbers(Struct):
 class ElementState(Struct):
     """An element in parallel with the plays, at the last turn of its input."""
 
-    high: Real = note("z/width in the direction of the input,")
+    s: Real = note("z/width in the direction of the input, with a tilted drive plus `lean`,")
     low: Real = note("and its rounding remainder")
     place: Real = note("on the curve,")
     level: Real = note("the curve's value there,")
     until: Real = note("the distance to the end of its piece,")
-    c: SevenReals = note("and its coefficients from there on")
+    c: SevenReals = note("its coefficients from there on,")
+    lean: Real = note("and the change of the drive over a width from there on")
 
 
 class FixedElementState(Struct):
     """An element in parallel with the plays, at the last turn of its input."""
 
-    s: Int64 = note("z/width in the direction of the input,")
+    s: Int64 = note("z/width in the direction of the input, with a tilted drive plus `lean`,")
+    low: Literal = note("0")
     place: Int64 = note("on the curve,")
     level: Int64 = note("the curve's value there,")
     until: Int64 = note("the distance to the end of its piece,")
     c: FiveInt32 = note("the coefficients of its mean slope from there on,")
-    scale: UInt8 = note("and the right shift to the share of the piece's length")
+    scale: UInt8 = note("the right shift to the share of the piece's length,")
+    lean: Int32 = note("and the change of the drive over a width from there on")
+
+
+class CurvePiece(Struct):
+    """A piece of the curve of elements in parallel with the plays: its begin and the curve's value there, coefficients
+    from there on, and those of the inverse."""
+
+    begin: Real
+    level: Real
+    up: SevenReals
+    back: SevenReals
+
+
+class Tilt(Struct):
+    """The tilted drive `1 + t w` of an element, over its largest value: change over a width, and where that is."""
+
+    lean: Narrow
+    top: Play
+    rest: Literal = note("z/width at rest, plus `lean`")
 
 
 class FixedPiece(Struct):
@@ -183,48 +205,52 @@ class ElementsState(NamedTuple, Generic[E]):
     departs: Counts
     element: E
 
+    @classmethod
+    def of(cls, elements: E, dtype: DTypeLike) -> ElementsState[E]:
+        """Memory of the given elements."""
+        turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
+        upward, departs = np.ones((2, 1), np.int64)
+        return cls(turned, upward, found, asked, slope, steep, departs, elements)
+
 
 class ElementTables(NamedTuple):
-    """Constants of elements (k,) in parallel with the plays, which follow one curve. `piece` (K + 1, 2 + 2 D): where
-    each piece of the curve begins, its value there, and the coefficients of the curve and of its inverse from there
-    on."""
+    """Constants of elements (k,) in parallel with the plays, which follow one curve in pieces (K + 1,); `tilt` (k,) or
+    (0,): of tilted drives, for which `base` (1,) is subtracted from the sum."""
 
-    piece: Reals
+    piece: CurvePiece
     element: ElementNumbers
+    tilt: Tilt
+    base: Reals
 
     @classmethod
     def none(cls, dtype: Any) -> ElementTables:
         """The tables of a model without elements."""
-        return cls(np.zeros((1, 4), dtype), ElementNumbers.zeros(0, dtype))
+        element, tilt = ElementNumbers.zeros(0, dtype), Tilt.zeros(0, dtype)
+        return cls(CurvePiece.zeros(1, dtype), element, tilt, np.zeros(1, dtype))
 
     def memory(self) -> ElementsState[ElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        dtype = self.piece.dtype
-        turned, found, asked, slope, steep = np.zeros((5, 1), dtype)
-        one = np.ones(1, np.int64)
-        elements = ElementState.zeros(len(self.element), dtype)
-        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
+        return ElementsState.of(ElementState.zeros(len(self.element), self.base.dtype), self.base.dtype)
 
 
 class FixedElementTables(NamedTuple):
-    """The same in fixed point: pieces (K + 1,) of the curve, and elements (k,); `straight`: distance from an input, in
-    steps, within which the sum is computed along its slope there."""
+    """The same in fixed point; `straight`: distance from an input, in steps, within which the sum is computed along its
+    slope there."""
 
     piece: FixedPiece
     element: FixedElement
+    tilt: Tilt
+    base: Reals
     straight: int
 
     @classmethod
     def none(cls) -> FixedElementTables:
         """The tables of a model without elements."""
-        return cls(FixedPiece.zeros(1), FixedElement.zeros(0), 0)
+        return cls(FixedPiece.zeros(1), FixedElement.zeros(0), Tilt.zeros(0), np.zeros(1, np.int64), 0)
 
     def memory(self) -> ElementsState[FixedElementState]:
         """Memory for these elements; `Elements.unload` sets it."""
-        turned, found, asked, slope, steep = np.zeros((5, 1), np.int64)
-        one = np.ones(1, np.int64)
-        elements = FixedElementState.zeros(len(self.element))
-        return ElementsState(turned, one, found, asked, slope, steep, one.copy(), elements)
+        return ElementsState.of(FixedElementState.zeros(len(self.element)), np.int64)
 
 
 class MovingTables(NamedTuple):
@@ -387,14 +413,18 @@ class PlaysPart(Generic[T, F]):
 
 
 class ParallelTerms(NamedTuple):
-    """Elements (k,) in parallel with the plays: weights, largest |z| (`most`), largest change of z per change of the
-    input (`steepest`), and of that per change of the input (`bend`); `memory`: the elements in double precision;
-    `tables`: their constants in a data type; `error`: bound on the error of their sum in a data type, in the C (True)
-    or of the law in double precision; `coded`: their constants in fixed point for steps of the input and of the sum,
-    and the error of the sum allowed where it is computed along its slope; `coded_error`: bound on its other errors."""
+    """Elements (k,) in parallel with the plays: weights; largest |z| (`most`); -z at the smallest and z at the largest
+    input after a move across the range from rest (`ends` (k, 2)); smallest and largest change of z per change of the
+    input, the smallest if below 0 (`flattest`, `steepest`), and largest change of that (`bend`); `memory`: the elements
+    in double precision; `tables`: their constants in a data type; `error`: bound on the error of their sum in a data
+    type, in the C (True) or of the law in double precision; `coded`: their constants in fixed point for steps of the
+    input and of the sum, and the error of the sum allowed where it is computed along its slope; `coded_error`: bound on
+    its other errors."""
 
     weights: Array
     most: Array
+    ends: Array
+    flattest: Array
     steepest: Array
     bend: Array
     memory: ElementsInDouble
@@ -415,7 +445,7 @@ class Elements(NamedTuple):
 
 @dataclass(frozen=True)
 class ElementsPart:
-    """An effect in parallel with the plays: `of` describes it, from the effect and the span of its input; `floating`:
+    """An effect in parallel with the plays: `of` describes it, from the effect and the ends of its input; `floating`:
     its functions; `coded` loads them in fixed point."""
 
     of: Callable[..., ParallelTerms]

@@ -98,7 +98,6 @@ MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
 """Run-time files for how plays move and how they are bent, indexed by the codes of `hystgen.effects.plays`."""
 
-
 SETTINGS = {
     "push": slots.OP_PUSH,
     "settle": slots.OP_SETTLE,

@@ -334,6 +334,14 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
     ]
 
 
+def structures(writer: Writer, *arrays: tuple[str, Struct]) -> list[ConstantTable]:
+    """Tables of structures, whose types are named like them, unless they are empty."""
+    return [
+        writer.rows(f"{name}_t", name, [members(type(part), row) for row in part])
+        for name, part in arrays if len(part)
+    ]
+
+
 def truth(x: object) -> str:
     """A truth value in C."""
     return "true" if x else "false"

@@ -325,15 +325,15 @@ def _elements(m: MovingTables | FixedMovingTables) -> tuple[tuple[int, int], tup
     """Multiplications and comparisons of the sum of elements in parallel with the plays, and of their turn."""
     from hystgen.effects import plays
 
-    count, looked = len(m.elements.element), len(m.elements.piece).bit_length()
+    count, looked, tilted = len(m.elements.element), len(m.elements.piece).bit_length(), len(m.elements.tilt) > 0
     if isinstance(m, plays.FixedMovingTables):
         degree = m.elements.piece.up.shape[1]
-        at = 2 * degree + 8, looked + 8  # five products have two parts, and each piece's slope comes with its mean
-        put = degree * (degree + 5) // 2 + 5, looked + 8
+        at = 2 * (degree + tilted) + 8, looked + 8  # five products in two parts, and a piece's slope with its mean
+        put = degree * (degree + 7) // 2 + 5 + 4 * tilted, looked + 8 + 2 * tilted
     else:
-        degree = (m.elements.piece.shape[1] - 2) // 2
-        at = 2 * degree + 2, looked + 2
-        put = degree * (degree + 3) // 2, looked + 2
+        degree = m.elements.piece.up.shape[1]
+        at = 2 * degree + 2 + tilted, looked + 2
+        put = degree * (degree + 3) // 2 + 2 * tilted, looked + 2
     if not count:
         return (0, 0), (0, 0)
     return (count * at[0] + 1, count * at[1] + 6), (count * (at[0] + put[0]), count * (at[1] + put[1]))

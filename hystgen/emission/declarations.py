@@ -15,6 +15,7 @@ from hystgen.effects.bend import BendCurve, Bump, SmoothLimit
 from hystgen.effects.kinds import BlockKind
 from hystgen.effects.maps import FixedStops
 from hystgen.effects.plays import (
+    CurvePiece,
     ElementState,
     FixedElement,
     FixedElementState,
@@ -22,13 +23,15 @@ from hystgen.effects.plays import (
     FixedSearchState,
     FixedYield,
     SearchState,
+    Tilt,
 )
 from hystgen.emission.runtime import Field, Piece, declared_type
 from hystgen.emission.text import WIDTH
 
-IN_BOTH: Mapping[str, type[Struct]] = {"ramp_t": RampState, "quiet_t": QuietState, "steady_t": SteadyState}
+IN_BOTH: Mapping[str, type[Struct]] = {"ramp_t": RampState, "quiet_t": QuietState, "steady_t": SteadyState,
+                                             "tilt_t": Tilt}
 OTHERS: Mapping[str, Mapping[str, type[Struct]]] = {
-    "float": {"search_t": SearchState, "element_t": ElementState},
+    "float": {"search_t": SearchState, "piece_t": CurvePiece, "element_t": ElementState},
     "fixed": {
         "factor_t": Factor, "number_t": FixedNumber, "bend_curve_t": BendCurve, "bend_t": SmoothLimit, "bump_t": Bump,
         "stops_t": FixedStops, "yield_t": FixedYield, "search_t": FixedSearchState, "piece_t": FixedPiece,

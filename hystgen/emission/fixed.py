@@ -24,6 +24,7 @@ from hystgen.emission.compensator import (
     macros,
     members,
     pointers,
+    structures,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Codes, Compiled
     from hystgen.compensator.chain.moving import FixedMovingTables
     from hystgen.effects.bend import Bends
-    from hystgen.effects.plays import FixedElementTables
     from hystgen.model import Model
 
 COLUMNS = (("threshold", "play_t"), ("weight", "int32_t"), ("slope", "int32_t"), ("reciprocal", "uint32_t"),
@@ -167,11 +167,13 @@ class FixedForm(Form):
                 ("BUMP_BITS", f"{plays.bump_bits}u", "bits of its values below a step of the plays' input"),
             ]
         if count := len(plays.elements.element):
-            arrays += _elements(plays.elements, writer)
+            own = plays.elements
+            arrays += structures(writer, ("piece", own.piece), ("element_table", own.element), ("tilt", own.tilt))
             numbers += [
                 ("ELEMENTS", f"{count}u", "in parallel with the plays"),
-                ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
-                ("STRAIGHT", operand(plays.elements.straight), "steps of the input over which their sum is straight"),
+                ("PIECES", f"{len(own.piece)}u", "of their curve"),
+                ("BASE", operand(own.base[0]), "subtracted from the sum of elements with a tilted drive"),
+                ("STRAIGHT", operand(own.straight), "steps of the input over which their sum is straight"),
             ]
         return arrays, numbers
 
@@ -337,12 +339,6 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[ConstantTable]:
         writer.rows("bump_t", "bump", rows),
         writer.array("uint16_t", "bump_of", list(t.bump_of)),
     ]
-
-
-def _elements(t: FixedElementTables, writer: Writer) -> list[ConstantTable]:
-    """The pieces of the curve of elements in parallel with the plays, and the elements."""
-    arrays = (("piece_t", "piece", t.piece), ("element_table_t", "element_table", t.element))
-    return [writer.rows(kind, name, [members(type(part), row) for row in part]) for kind, name, part in arrays]
 
 
 def _saturation(t: ChainTables, j: int, writer: Writer) -> EmittedStage:

@@ -25,6 +25,7 @@ from hystgen.emission.compensator import (
     macros,
     macros_of,
     pointers,
+    structures,
 )
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Field
@@ -110,11 +111,11 @@ class FloatingForm(Form):
         for name, rows, wanted in (
             ("yields", plays.yields, plays.moves == moving.DASHPOT),
             ("curve", plays.curve, plays.bends == moving.POLYNOMIAL),
-            ("piece", plays.elements.piece, len(plays.elements.element) > 0),
         ):
             if wanted:
                 arrays.append(writer.matrix("real_t", name, list(rows)))
         if len(plays.elements.element):
+            arrays += structures(writer, ("piece", plays.elements.piece), ("tilt", plays.elements.tilt))
             arrays += [
                 writer.array("real_t", f"element_{name}", list(getattr(plays.elements.element, name)))
                 for name in type(plays.elements.element).members()
@@ -128,6 +129,7 @@ class FloatingForm(Form):
             ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
             ("ELEMENTS", f"{len(plays.elements.element)}u", "in parallel with the plays"),
             ("PIECES", f"{len(plays.elements.piece)}u", "of their curve"),
+            ("BASE", operand(plays.elements.base[0]), "subtracted from the sum of elements with a tilted drive"),
         ]
 
     def factors(self, own: str, rows: Reals, writer: Writer) -> ConstantTable:

@@ -66,7 +66,7 @@ def _variant(
     return dataclasses.replace(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
         waiting=t.of("wait").samples, taps=len(t.tap), calls=frozenset(t.calls), moves=moves, bends=bends,
-        elements=len(t.moving.elements.element),
+        elements=len(t.moving.elements.element), tilted=len(t.moving.elements.tilt) > 0,
     )
 
 

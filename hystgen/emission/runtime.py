@@ -246,7 +246,7 @@ class Variant:
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
     `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
     add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
-    `elements`: number of elements in parallel with them.
+    `elements`: number of elements in parallel with them; `tilted`: their drive is.
     """
 
     engine: str
@@ -267,6 +267,7 @@ class Variant:
     moves: str = ""
     bends: str = ""
     elements: int = 0
+    tilted: bool = False
 
     @property
     def apart(self) -> tuple[str, ...]:
@@ -286,6 +287,7 @@ class Variant:
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
             "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre", "ELEMENTS": self.elements,
+            "TILT": self.tilted,
             "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
             "SMOOTH_SUM": self.smooth,

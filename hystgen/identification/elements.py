@@ -33,7 +33,6 @@ TRIES = 60
 PRECISE = 1e-7
 """[logarithms of `FAR` over `NEAR`] Approaches are found to this precision: to 1e-6 of an element's limit."""
 
-
 LOOPS = 4
 """[turns] Smallest number of turns between smaller loops that shows whether loops close: two loops have four. The turns
 where a record begins and ends belong to none."""

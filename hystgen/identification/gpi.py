@@ -30,8 +30,8 @@ KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Kinds of model that can be requested."""
 
 PROMISING = 0.95
-"""[fraction of the error with plays alone] Further elements are tried only if the simplest leave at most this on blocks
-left out of the fit, far more than `auto` accepts. Set by: the run time of `auto`."""
+"""[fraction of the error with plays alone] Further elements are tried only if the simplest leave at most this in the
+fit, far more than `auto` accepts. Blocks left out of the fit choose among them. Set by: the run time of `auto`."""
 
 ROUNDS = 2
 """[searches] Number for the elements and the unknown starts of the records in turn. Set by: the Dahl and Bouc-Wen
@@ -122,11 +122,12 @@ def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[Fitte
 
 @dataclass(frozen=True)
 class _Found:
-    """A front, its shape with a dense list of plays behind it, its error on blocks left out of the fit, and the courses
-    with their approaches."""
+    """A front, its shape with a dense list of plays behind it, its error in the fit (`rms`) and on blocks left out of
+    it, and the courses with their approaches."""
 
     front: Front
     shape: Array
+    rms: float
     error: float
     courses: Sequence[Course]
 
@@ -155,13 +156,13 @@ def _solved(
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
     alone = math.inf
     if kind == effects.PARALLEL:
-        alone = validation(joint.refine(compared, Kept(), Kept().straight, fine, how.tick), Kept())
+        alone = joint.refine(compared, Kept(), Kept().straight, fine, how.tick).rms
     found: list[_Found] = []
     for front in fronts_of(kind, compared, how.breaks):
-        if found and found[0].error > PROMISING * alone:  # the simplest elements do not help
+        if found and found[0].rms > PROMISING * alone:  # the simplest elements do not help
             break
         begun, shaped = _shaped(compared, front, fine, found, how.tick)
-        found.append(_Found(front, shaped.shape, validation(shaped, front), begun))
+        found.append(_Found(front, shaped.shape, shaped.rms, validation(shaped, front), begun))
     return [_finished(courses, each, plain, how) for each in choose(found)]
 
 

@@ -30,7 +30,6 @@ MOST_FITS = 4
 LESS_MISSED = 0.25
 """The drive, not the output, is wrong if bridging it reduces the squared error to less than this fraction."""
 
-
 LEAST_MOVEMENT = 1e-20
 """A smaller motion of drive or output cannot be a measurement: its square, or its ratio to the other motion, falls
 outside the range of double precision and of parameter files."""

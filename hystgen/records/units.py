@@ -145,7 +145,6 @@ class UnitGoal(NamedTuple):
 QUANTITIES = {"input": "drive", "output": "output"}
 """Keys of a parameter file's `units`, and the quantity each belongs to."""
 
-
 KEYS = {"v": "input", "y": "output", "u": "output"}
 """Columns and their keys in a parameter file's `units`."""
 

@@ -30,7 +30,6 @@ FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
 
-
 P = ParamSpec("P")
 
 

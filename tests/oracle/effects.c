@@ -110,6 +110,12 @@ static real element_after(const plant_t *p, const memory_t *s, int j, real w, re
     const real way = (w - s->w) / (real)p->m->width[j], side = way < 0 ? -1 : 1;
     const bool squared = p->m->exponent == 2;
     real x = side * way, to = side * s->element[j];
+    if (p->m->tilt) { /* `ds/dx = 1 + t w - s`, with w in a straight line */
+        const real begin = 1 + (real)p->m->tilt[j] * s->w, lean = side * (real)p->m->tilt[j] * (real)p->m->width[j];
+        to = to * expl(-x) - (begin - lean) * expm1l(-x) + lean * x;
+        *slope = begin + lean * x - to;
+        return side * to;
+    }
     if (to < 0) {
         to = rising(p, to, &x);
     }

@@ -49,6 +49,7 @@ typedef struct {
     int elements; /* Bouc-Wen elements in parallel with the plays */
     const double *part, *width;
     double exponent, balance; /* an exponent of 1 or 2 */
+    const double *tilt;       /* of the drive, with an exponent and a balance of 1; NULL without */
 } effects_model_t;
 
 enum { EFFECTS_STEP, EFFECTS_HELD, EFFECTS_COMMIT, EFFECTS_SETTLE, EFFECTS_TEMPERATURE, EFFECTS_PUSH };

@@ -45,6 +45,7 @@ class _Model(ctypes.Structure):
         ("elements", ctypes.c_int), ("part", ctypes.POINTER(ctypes.c_double)),
         ("width", ctypes.POINTER(ctypes.c_double)),
         *((name, ctypes.c_double) for name in ("exponent", "balance")),
+        ("tilt", ctypes.POINTER(ctypes.c_double)),
     )  # fmt: skip
 
 
@@ -147,6 +148,7 @@ def model_of(case: Case) -> _Model:
         effects.get("delay", {}).get("time", 0.0), effects.get("lag", {}).get("time_constant", 0.0),
         len(elements.get("weights", ())), doubles(elements.get("weights", ())), doubles(elements.get("widths", ())),
         elements.get("exponent", 1.0), elements.get("balance", 1.0),
+        doubles(elements["tilts"]) if "tilts" in elements else None,
     )  # fmt: skip
 
 
@@ -201,6 +203,12 @@ def drawn(seed: int, arithmetic: str) -> Case:
         parts = [float(x) for x in room * rng.uniform(-0.8, 1.6, k)]
         widths = [float(x) for x in span * 10.0 ** rng.uniform(-1.3, 0.0, k)]
         keys = {"weights": parts, "widths": widths, "exponent": float(rng.choice([1.0, 2.0])), "balance": balance}
+        if rng.random() < 0.5:  # with tilted drives, whose slope right after a turn is up to 2
+            middle, share = low + 0.5 * span, rng.uniform(-0.9, 0.9, k)
+            leans = share / np.maximum(0.5 * span + np.array(widths), abs(middle))  # about the middle of the range
+            parts = (np.array(parts) * balance * (1.0 - leans * middle) / (1.0 + np.abs(share))).tolist()
+            tilts = (leans / (1.0 - leans * middle)).tolist()
+            keys = {"shape": "duhem", "weights": parts, "widths": widths, "tilts": tilts}
         effects.append({"name": "bouc_wen", **keys})
     return Case(f"m{seed}", data, arithmetic)
 
@@ -279,7 +287,7 @@ def _shim(case: Case) -> str:
         f"#ifdef {macro}_INVERSE_MAX_ERROR{ending}",
         f"#define BOUND_{macro} {macro}_INVERSE_MAX_ERROR{ending}",
         "#else",
-        f"#define BOUND_{macro} ({macro}_DRIVE_MAX - {macro}_DRIVE_MIN)",
+        f"#define BOUND_{macro} ((double){macro}_DRIVE_MAX - {macro}_DRIVE_MIN)",
         "#endif",
         f"const effects_probe_t {name}_probe = {{{', '.join(numbers)}}};",
     ]

@@ -19,6 +19,7 @@
 #define HYSTGEN_YIELDS 8u
 #define HYSTGEN_ELEMENTS 2u
 #define HYSTGEN_PIECES 20u
+#define HYSTGEN_BASE 1
 
 #ifdef HYSTGEN_FIXED
 #define HYSTGEN_FINE_MIN (-32767)
@@ -100,12 +101,13 @@ extern const hystgen_real_t hystgen_kept[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_real_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_real_t hystgen_yields[HYSTGEN_YIELDS][5];
 extern const hystgen_real_t hystgen_curve[HYSTGEN_N_PLAYS + 1][HYSTGEN_TERMS];
-extern const hystgen_real_t hystgen_piece[HYSTGEN_PIECES][16];
+extern const hystgen_piece_t hystgen_piece[HYSTGEN_PIECES];
 extern const hystgen_real_t hystgen_element_weight[HYSTGEN_ELEMENTS];
 extern const hystgen_real_t hystgen_element_amplitude[HYSTGEN_ELEMENTS];
 extern const hystgen_real_t hystgen_element_inverse_width[HYSTGEN_ELEMENTS];
 #endif
 
+extern const hystgen_tilt_t hystgen_tilt[HYSTGEN_ELEMENTS];
 extern const hystgen_factor_t hystgen_waited[1];
 extern const hystgen_lag_table_t hystgen_braked_1;
 extern const hystgen_ageing_table_t hystgen_ageing_1;

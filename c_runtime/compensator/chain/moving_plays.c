@@ -32,7 +32,7 @@ static void hystgen_operator_depart(hystgen_operator_t *self, hystgen_play_t w, 
     self->departs = true;
     HYSTGEN_ROLLED
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
-        self->slope += hystgen_element_turned(j, &self->element[j]);
+        self->slope += hystgen_element_slope(j, self->element[j].c[0] >> HYSTGEN_STEEP);
     }
 }
 #endif
@@ -43,7 +43,7 @@ HYSTGEN_APART void hystgen_operator_turn_elements(hystgen_operator_t *self) {
     unsigned int j;
     HYSTGEN_ROLLED
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
-        hystgen_element_turn(&self->element[j], hystgen_element_distance(j, way));
+        hystgen_element_turn(j, &self->element[j], hystgen_element_distance(j, way), self->play[0]);
     }
 #ifdef HYSTGEN_FIXED
     hystgen_operator_depart(self, self->play[0], hystgen_operator_joined(self, self->play[0]));
@@ -72,6 +72,9 @@ HYSTGEN_APART void hystgen_operator_approach(hystgen_operator_t *self, hystgen_p
         sum += hystgen_element_part(j, &self->element[j], hystgen_element_distance(j, way),
                                     &self->slope);
     }
+#ifdef HYSTGEN_HAS_TILT
+    sum -= self->upward ? HYSTGEN_BASE : -HYSTGEN_BASE;
+#endif
     self->joined = self->upward ? sum : -sum;
 }
 
@@ -95,6 +98,9 @@ HYSTGEN_APART hystgen_sum_t hystgen_operator_joined(const hystgen_operator_t *se
         sum = sum + hystgen_element_amplitude[j] * s;
         *slope = *slope + hystgen_element_weight[j] * change;
     }
+#ifdef HYSTGEN_HAS_TILT
+    sum = sum - (self->upward ? HYSTGEN_BASE : -HYSTGEN_BASE);
+#endif
     return self->upward ? sum : -sum;
 }
 #endif
@@ -114,7 +120,7 @@ static bool hystgen_operator_elements(hystgen_operator_t *self, hystgen_play_t w
     self->upward = true;
     HYSTGEN_ROLLED
     for (j = 0; j < HYSTGEN_ELEMENTS; ++j) {
-        hystgen_element_unload(&self->element[j]);
+        hystgen_element_unload(j, &self->element[j], w);
     }
 #ifdef HYSTGEN_FIXED
     hystgen_operator_depart(self, w, 0);

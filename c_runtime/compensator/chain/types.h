@@ -27,6 +27,13 @@ typedef struct {
     bool rises;             /* the lag arrives from below */
 } hystgen_steady_t;
 
+/* The tilted drive `1 + t w` of an element, over its largest value: change over a width, and where
+   that is. */
+typedef struct {
+    hystgen_narrow_t lean;
+    hystgen_play_t top;
+} hystgen_tilt_t;
+
 #ifdef HYSTGEN_FIXED
 /* A real factor: mantissa / 2^shift. */
 typedef struct {
@@ -131,12 +138,13 @@ typedef struct {
 
 /* An element in parallel with the plays, at the last turn of its input. */
 typedef struct {
-    int64_t s;     /* z/width in the direction of the input, */
+    int64_t s;     /* z/width in the direction of the input, with a tilted drive plus `lean`, */
     int64_t place; /* on the curve, */
     int64_t level; /* the curve's value there, */
     int64_t until; /* the distance to the end of its piece, */
     int32_t c[5];  /* the coefficients of its mean slope from there on, */
-    uint8_t scale; /* and the right shift to the share of the piece's length */
+    uint8_t scale; /* the right shift to the share of the piece's length, */
+    int32_t lean;  /* and the change of the drive over a width from there on */
 } hystgen_element_t;
 
 /* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */
@@ -179,14 +187,24 @@ typedef struct {
     hystgen_real_t slope; /* change in their sum per unit change in their input, in steady motion */
 } hystgen_search_t;
 
+/* A piece of the curve of elements in parallel with the plays: its begin and the curve's value
+   there, coefficients from there on, and those of the inverse. */
+typedef struct {
+    hystgen_real_t begin;
+    hystgen_real_t level;
+    hystgen_real_t up[7];
+    hystgen_real_t back[7];
+} hystgen_piece_t;
+
 /* An element in parallel with the plays, at the last turn of its input. */
 typedef struct {
-    hystgen_real_t high;  /* z/width in the direction of the input, */
+    hystgen_real_t s; /* z/width in the direction of the input, with a tilted drive plus `lean`, */
     hystgen_real_t low;   /* and its rounding remainder */
     hystgen_real_t place; /* on the curve, */
     hystgen_real_t level; /* the curve's value there, */
     hystgen_real_t until; /* the distance to the end of its piece, */
-    hystgen_real_t c[7];  /* and its coefficients from there on */
+    hystgen_real_t c[7];  /* its coefficients from there on, */
+    hystgen_real_t lean;  /* and the change of the drive over a width from there on */
 } hystgen_element_t;
 
 /* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */

@@ -444,8 +444,9 @@ def output_span(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, 
     """Extremes of the sum of the plays and of elements in parallel with them, over all drive histories within the input
     range. At the largest input so far z is 0, as after `settle`, or above, at most as large as after a full sweep."""
     low, high = (settled(static, effects, end) for end in static.play_range)
-    more = math.fsum(float(np.maximum(each.weights, 0.0) @ each.most) for each in moving.parallel(static, effects))
-    return low - more, high + more
+    found = (np.maximum(each.weights, 0.0) @ each.ends for each in moving.parallel(static, effects))
+    below, above = sum(found, start=np.zeros(2)).tolist()
+    return low - below, high + above
 
 
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:

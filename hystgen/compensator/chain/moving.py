@@ -52,8 +52,7 @@ def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None
 
 def parallel(static: StaticModel, effects: Sequence[Effect]) -> list[at.ParallelTerms]:
     """The elements in parallel with the plays, if an effect adds them."""
-    low, high = static.play_range
-    return [ELEMENTS.of(effect, high - low) for effect in effects if effect.joins_plays()]
+    return [ELEMENTS.of(effect, *static.play_range) for effect in effects if effect.joins_plays()]
 
 
 def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
@@ -63,10 +62,10 @@ def largest_parallel(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 def parallel_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[float, float]:
     """Smallest and largest change of the sum of the elements per change of their input, over all histories."""
-    found = [each.weights * each.steepest for each in parallel(static, effects)]
+    found = [each.weights * np.stack([each.flattest, each.steepest]) for each in parallel(static, effects)]
     return (
-        math.fsum(float(np.sum(np.minimum(each, 0.0))) for each in found),
-        math.fsum(float(np.sum(np.maximum(each, 0.0))) for each in found),
+        math.fsum(float(np.sum(np.min(each, axis=0))) for each in found),
+        math.fsum(float(np.sum(np.max(each, axis=0))) for each in found),
     )
 
 
@@ -95,6 +94,10 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
     joining = [effect for effect in effects if effect.joins_plays()]
+    wrong = [(each, found) for each in joining for found in each.problems_within(*static.play_range)]
+    if wrong:
+        yield from wrong
+        return
     if joining and not (slope := least_slope(static, [*bending[:1], *joining])) > 0.0:
         falling = -parallel_slopes(static, joining)[0]
         what = f"right after a turn the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"

@@ -33,7 +33,6 @@ DIFFERENCES = 12, 2**25
 COMPARISONS = 40, 2**23
 """The same limits for errors after the free offsets and start states are fitted."""
 
-
 ROUNDED = float(np.finfo(np.float64).eps) ** 0.5
 """Smallest relative change in a value for a difference quotient, so that the slope keeps half of the digits."""
 

@@ -240,7 +240,6 @@ DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants, in samples, of the averages of the drive that represent rates and creep."""
 
-
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
 """[fraction of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each
 about three times the previous one, from the smallest play up to five ranges. Six lengths explain 0.55 of a play model's

@@ -32,19 +32,8 @@ Array = NDArray[np.float64]
 BALANCE = 0.9
 """Balance from which a search starts, between 1 (Dahl's element) and 0.5 (one that unloads in a straight line)."""
 
-WEIGHT = 5.0
-"""[mean slopes of the records] Largest magnitude of the weight: friction of five times the stage's stiffness has no
-inverse. The weight is negative, so that the output lags; with a positive weight, it would lead."""
-
 LOOP = 0.1
 """[fraction of the drive range] Width of the minor loop that is reported to stay open, as in `docs/plants.md`."""
-
-WITHIN = 0.01, 1.0
-"""[fractions of the drive range] Smallest and largest distance over which the element forgets: below, it acts like
-plays with the smallest thresholds; above, like a straight line and a memory of the start."""
-
-STARTS = 5
-"""[widths] Number of widths from which a search starts, each about three times the previous one."""
 
 STEPS = 12
 """[steps] Maximum number in the search from the best width; six usually settle three parameters and the weights."""
@@ -119,20 +108,17 @@ def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> O
 
 def _element(now: Fitted, records: Records) -> Tried:
     """The hypothesis with the element, started at the best of several widths and fitted well enough for ranking."""
-    low, high = records.known.drive
-    wide, slope = high - low, records.known.output_range / (high - low)
+    kind, simpler = shapes(PARALLEL)[:2]
+    dahl = simpler.candidates(replace(records.known, speeds=True))[0]
 
     def build(x: Array) -> Effect:
-        weights, widths = (slope * float(x[0]),), (wide * float(10.0 ** x[1]),)
-        entry = {"name": PARALLEL, "weights": weights, "widths": widths, "balance": float(x[2])}
-        return shapes(PARALLEL)[0].model_validate(entry)
+        found = dahl.build(x[:2]).model_dump(exclude={"shape"})
+        return kind.model_validate({**found, "balance": float(x[2])})
 
-    ends = np.log10(WITHIN)
-    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], STARTS)]
-    candidate = Candidate(
-        "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
-        build, None, tuple(starts[1:]), amounts=(0,),
-    )
+    starts = [np.append(start, BALANCE) for start in (dahl.start, *dahl.others)]
+    low, high = np.append(dahl.low, 0.5 + 1e-6), np.append(dahl.high, 1.0)
+    high[0] = 0.0  # with a positive weight the output would lead
+    candidate = Candidate("an element that forgets", low, high, starts[0], build, None, tuple(starts[1:]), amounts=(0,))
 
     def structure(part: Candidate) -> Structure:
         return replace(now.structure, parts=(*now.structure.parts, Part(PARALLEL, part)))

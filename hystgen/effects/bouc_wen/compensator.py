@@ -9,10 +9,11 @@ import numpy as np
 
 from hystgen.basics.jit import Scalar, jit
 from hystgen.effects.bouc_wen.curve import halves
-from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements, place_of, reach
-from hystgen.effects.bouc_wen.pieces import CurvePieces, largest, pieces
-from hystgen.effects.part import late
+from hystgen.effects.bouc_wen.model import ParallelElements, at_rest, moved
+from hystgen.effects.bouc_wen.pieces import CurvePieces, extremes, pieces
+from hystgen.effects.part import Function, late
 from hystgen.effects.plays import (
+    CurvePiece,
     ElementNumbers,
     Elements,
     ElementsPart,
@@ -21,7 +22,9 @@ from hystgen.effects.plays import (
     ElementTables,
     FixedElementTables,
     ParallelTerms,
+    Tilt,
 )
+from hystgen.plays.slots import Reals
 
 DEGREE = 7
 """Degree of the curve's polynomials in floating point, by the pieces that `pieces` needs for three laws: 17 to 32 in
@@ -39,50 +42,35 @@ EXACT = 1e-14
 class LoadedElements:
     """Elements in double precision, one input at a time."""
 
-    def __init__(self, effect: BoucWenElements | DahlElements) -> None:
-        exponent, balance = effect.law
-        self.above, self.below = halves(exponent, balance)
-        self.elements = list(zip(effect.weights, effect.widths, strict=True))
+    def __init__(self, effect: ParallelElements) -> None:
+        self.halves = halves(*effect.law)
+        self.elements = list(zip(effect.weights, effect.widths, effect.leans, strict=True))
         self.rest(0.0)
 
     def rest(self, w: float) -> None:
         """Unload every element, z = 0, with the input at w."""
-        self.way, self.turned, self.input = 1.0, w, w
-        self.begin = [0.0] * len(self.elements)
-
-    def _s(self, j: int, way: float, begin: float, w: float) -> float:
-        return float(reach(self.above, self.below, begin + way * (w - self.turned) / self.elements[j][1]))
-
-    def _turned(self) -> list[float]:
-        here = [self._s(j, self.way, begin, self.input) for j, begin in enumerate(self.begin)]
-        return [float(place_of(self.above, self.below, -s)) for s in here]
+        self.memory = [at_rest(w, width, tilt) for _, width, tilt in self.elements]
 
     def total(self, w: float) -> float:
         """`sum k z` after the input has moved to w; moves nothing."""
-        kept = self.way, self.turned, self.input, self.begin
-        self.move(w)
-        found = sum(
-            weight * width * self.way * self._s(j, self.way, self.begin[j], w)
-            for j, (weight, width) in enumerate(self.elements)
-        )
-        self.way, self.turned, self.input, self.begin = kept
-        return found
+        both = zip(self.memory, self.elements, strict=True)
+        return sum(k * width * float(moved(m.copy(), w, width, tilt, *self.halves)) for m, (k, width, tilt) in both)
 
     def move(self, w: float) -> None:
         """Move the input to w."""
-        if self.way * (w - self.input) < 0.0:
-            self.begin = self._turned()
-            self.way, self.turned = -self.way, self.input
-        self.input = w
+        for m, (_, width, tilt) in zip(self.memory, self.elements, strict=True):
+            moved(m, w, width, tilt, *self.halves)
 
 
-def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
-    """What a compensator needs to know of an effect's elements, for inputs within `span`."""
+def of(effect: ParallelElements, low: float, high: float) -> ParallelTerms:
+    """What a compensator needs to know of an effect's elements, for inputs within a range."""
     exponent, balance = effect.law
-    weights, widths = np.array(effect.weights), np.array(effect.widths)
-    most = np.array([largest(width, exponent, balance, span) for width in effect.widths])
-    steepest = 1.0 + (2.0 * balance - 1.0) * most**exponent  # right after a reversal
-    bend = exponent * max(1.0, 2.0 * balance - 1.0) * steepest / widths  # as |s| <= 1
+    weights, widths, drive, lean, top = effect.tilted(low, high)
+    shapes = zip(effect.widths, effect.leans, strict=True)
+    ends, steepest = map(np.array, zip(*(extremes(each, effect.law, low, high) for each in shapes), strict=True))
+    most = np.where(lean == 0.0, ends[:, 0], widths * (drive + np.abs(lean)))
+    bend = exponent * max(1.0, 2.0 * balance - 1.0) * (steepest + np.abs(lean)) / widths  # as |s| <= 1
+    tilted = len(lean) * bool(np.any(lean))
 
     def polynomials(dtype: Any) -> CurvePieces:
         return pieces(exponent, balance, DEGREE, max(FINEST * float(np.finfo(dtype).eps) / 2, EXACT))
@@ -90,27 +78,29 @@ def of(effect: BoucWenElements | DahlElements, span: float) -> ParallelTerms:
     def error(dtype: Any, emitted: bool) -> float:
         found, unit = polynomials(dtype), float(np.finfo(dtype).eps) / 2
         off = (found.error, found.slip) if emitted else (EXACT, EXACT)
-        size = float(np.abs(weights) @ widths)
-        return size * drifted(exponent, off[0] + 8.0 * unit, off[1] + 16.0 * unit)
+        size = float(np.abs(weights) @ (widths * drive))
+        return size * drifted(exponent, off[0] + 8.0 * unit, off[1] + (24.0 if tilted else 16.0) * unit)
 
     def tables(dtype: Any) -> ElementTables:
         found = polynomials(dtype)
-        rows = np.zeros((len(found.begin), 2 + 2 * DEGREE))
-        rows[:, 0], rows[:, 1] = found.begin, found.level
-        rows[:-1, 2 : 2 + DEGREE], rows[:-1, 2 + DEGREE :] = found.up, found.back
-        numbers = zip(weights, weights * widths, 1.0 / widths, strict=True)
-        return ElementTables(np.array(rows, dtype=dtype), ElementNumbers.of(numbers, dtype))
+        level_on = np.zeros(DEGREE)  # behind the last piece
+        rows = zip(found.begin, found.level, [*found.up, level_on], [*found.back, level_on], strict=True)
+        numbers = zip(weights * drive, weights * drive * widths, 1.0 / widths, strict=True)
+        tilt = Tilt.of([*zip(lean / drive, top, lean / drive, strict=True)][:tilted], dtype)
+        base = np.array([weights * widths @ lean], dtype)
+        return ElementTables(CurvePiece.of(rows, dtype), ElementNumbers.of(numbers, dtype), tilt, base)
 
     coded = late("bouc_wen", "of"), late("bouc_wen", "error")
 
     def straight(step: float, unit: float, off: float) -> FixedElementTables:
         most = float(np.abs(weights) @ bend)
-        found: FixedElementTables = coded[0]()(effect, step, unit, math.sqrt(2.0 * off / most) if most else math.inf)
+        near = math.sqrt(2.0 * off / most) if most else math.inf
+        found: FixedElementTables = coded[0]()(effect, (low, high), step, unit, near)
         return found
 
     return ParallelTerms(
-        weights, most * widths, steepest, bend, LoadedElements(effect), tables, error,
-        straight, lambda: coded[1]()(effect),
+        weights, most, ends, -np.abs(lean), steepest, bend, LoadedElements(effect), tables, error,
+        straight, lambda: coded[1]()(effect, low, high),
     )
 
 
@@ -128,110 +118,178 @@ def drifted(exponent: float, error: float, slip: float) -> float:
 # ---------------------------------------------------------------- elements.c
 
 
-@jit
-def piece_at(t: ElementTables, column: int, x: Scalar) -> int:
-    """The piece in which a place (column 0) or a value of the curve (column 1) lies."""
-    low = 0
-    high = len(t.piece)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x < t.piece[middle, column]:
-            high = middle
-        else:
-            low = middle
-    return low
+def functions(
+    part: Function, by_slope: Function, steep: Function, share: Function, back: Function, distance: Function,
+    amount: Function, weighed: Function,
+) -> Elements:
+    """The functions of elements, from those of one arithmetic: `part`, `by_slope`: y times h, and a distance times a
+    slope; `steep`: a slope as it is summed; `share`: a distance on a piece or element as its polynomial takes it;
+    `back`: the distance at which piece i has a value, and its share, for element j; `distance`: a move of the input in
+    widths of element j; `amount`, `weighed`: its contributions to the sum and to the sum's slope."""
+
+    @jit
+    def piece_at(begins: Reals, x: Scalar) -> int:
+        """The piece in which a place or a value of the curve lies, given where pieces begin."""
+        low = 0
+        high = len(begins)
+        while high - low > 1:
+            middle = (low + high) // 2
+            if x < begins[middle]:
+                high = middle
+            else:
+                low = middle
+        return low
+
+    @jit
+    def slopes(c: Reals, j: int, h: Scalar) -> tuple[Scalar, Scalar]:
+        """Mean slope from the begin of a piece or element on, and the slope there, for coefficients c[j]."""
+        mean: Scalar = c[j, c.shape[1] - 1]
+        slope = steep(mean)
+        for k in range(c.shape[1] - 2, -1, -1):
+            mean = c[j, k] + part(mean, h)
+            slope = part(slope, h) + steep(mean)
+        return mean, slope
+
+    @jit
+    def gained(t: ElementTables, m: ElementsState[ElementState], j: int, x: Scalar) -> tuple[Scalar, Scalar]:
+        """Change of s of element j over the distance x since its last turn, and its slope there. Backwards, where a
+        search may try inputs, the curve goes on straight."""
+        e = m.element
+        if x < x - x:
+            return by_slope(x, e.c[j, 0]), steep(e.c[j, 0])
+        if x < e.until[j]:
+            mean, slope = slopes(e.c, j, share(e, j, x))
+            return by_slope(x, mean), slope
+        i = piece_at(t.piece.begin, e.place[j] + x)
+        on = e.place[j] + x - t.piece.begin[i]
+        mean, slope = slopes(t.piece.up, i, share(t.piece, i, on))
+        more = t.piece.level[i] + by_slope(on, mean) - e.level[j]
+        if len(t.tilt) > 0:
+            slope = slope + steep(e.lean[j])
+            more = more + by_slope(x, e.lean[j])
+        return more, slope
+
+    @jit
+    def depart(t: ElementTables, m: ElementsState[ElementState], j: int, w: Scalar) -> None:
+        """Put element j on the curve for a move from the input w: at its z/width, or with a tilted drive as far from
+        the limit there, over the largest limit."""
+        e = m.element
+        c = e.c
+        n = c.shape[1]
+        s = e.s[j]
+        if len(t.tilt) > 0:
+            s = s - by_slope(distance(t, j, w - t.tilt.top[j]), t.tilt.lean[j])
+        i = piece_at(t.piece.level, s)
+        x, h = back(t, m, i, j, s)
+        for k in range(n):
+            c[j, k] = t.piece.up[i, k]
+        for k in range(n - 1, 0, -1):  # the piece's polynomial about h: its mean slope up to there, then all others
+            c[j, k - 1] = c[j, k - 1] + part(c[j, k], h)
+        e.level[j] = t.piece.level[i] + by_slope(x, c[j, 0])
+        for first in range(1, n):
+            for k in range(n - 1, first - 1, -1):
+                c[j, k - 1] = c[j, k - 1] + part(c[j, k], h)
+        e.place[j] = t.piece.begin[i] + x
+        e.until[j] = t.piece.begin[i + 1] - e.place[j] if i < len(t.piece) - 1 else x - x
+        if len(t.tilt) > 0:
+            c[j, 0] = c[j, 0] + e.lean[j]
+
+    @jit
+    def unload(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
+        """Bring every element to rest at z = 0, with its input at w."""
+        m.turned[0] = w
+        m.upward[0] = 1
+        for j in range(len(t.element)):
+            m.element.s[j] = m.element.low[j] = t.base[0] - t.base[0]
+            if len(t.tilt) > 0:
+                m.element.lean[j] = t.tilt.lean[j]
+                m.element.s[j] = t.tilt.rest[j]
+            depart(t, m, j, w)
+
+    @jit
+    def turn(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
+        """Turn every element at the input w. Its s changes sign: exactly, with a rounding remainder, 0 in
+        fixed point."""
+        way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
+        last = t.piece.level[len(t.piece) - 1]
+        for j in range(len(t.element)):
+            more, _ = gained(t, m, j, distance(t, j, way))
+            s, low = m.element.s, m.element.low
+            high = s[j] + more
+            rise = high - s[j]
+            rounded = low[j] + ((s[j] - (high - rise)) + (more - rise))
+            whole = high + rounded
+            low[j] = whole - whole if whole > last or whole < -last else whole - high - rounded
+            s[j] = -min(max(whole, -last), last)
+            m.element.lean[j] = -m.element.lean[j]
+            depart(t, m, j, w)
+        m.turned[0] = w
+        m.upward[0] = 1 - m.upward[0]
+
+    @jit
+    def joined(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> tuple[Scalar, Scalar]:
+        """The sum of the elements with their input at w, and its slope."""
+        way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
+        total: Scalar = way - way
+        slope: Scalar = total
+        for j in range(len(t.element)):
+            more, steeper = gained(t, m, j, distance(t, j, way))
+            total = total + amount(t, j, m.element.s[j] + more + m.element.low[j])
+            slope = slope + weighed(t, j, steeper)
+        if len(t.tilt) > 0:
+            total = total - (t.base[0] if m.upward[0] else -t.base[0])
+        return (total if m.upward[0] else -total), slope
+
+    return Elements(joined, turn, unload)
+
+
+@jit(inline=True)
+def product(y: Scalar, h: Scalar) -> Scalar:
+    """y times h."""
+    return y * h
+
+
+@jit(inline=True)
+def same(slope: Scalar) -> Scalar:
+    """A slope as it is summed: as it is."""
+    return slope
+
+
+@jit(inline=True)
+def share(_: object, __: int, x: Scalar) -> Scalar:
+    """A distance as the polynomials take it: as it is."""
+    return x
 
 
 @jit
-def gained(t: ElementTables, m: ElementsState[ElementState], j: int, x: Scalar) -> tuple[Scalar, Scalar]:
-    """Change of s of element j over the distance x since its last turn, and its slope there. Backwards, where a search
-    may try inputs, the curve goes on straight."""
-    n = m.element.c.shape[1]
-    if x < x - x:
-        return m.element.c[j, 0] * x, m.element.c[j, 0]
-    if x < m.element.until[j]:
-        value: Scalar = m.element.c[j, n - 1]
-        slope: Scalar = value
-        for k in range(n - 2, -1, -1):
-            value = value * x + m.element.c[j, k]
-            slope = slope * x + value
-        return value * x, slope
-    i = piece_at(t, 0, m.element.place[j] + x)
-    h = m.element.place[j] + x - t.piece[i, 0]
-    value = t.piece[i, n + 1]
-    slope = value
-    for k in range(n, 1, -1):
-        value = value * h + t.piece[i, k]
-        slope = slope * h + value
-    return t.piece[i, 1] + value * h - m.element.level[j], slope
+def back(t: ElementTables, _: object, i: int, __: int, s: Scalar) -> tuple[Scalar, Scalar]:
+    """The distance from the begin of piece i at which the curve is s, twice."""
+    u = s - t.piece.level[i]
+    h: Scalar = t.piece.back[i, DEGREE - 1]
+    for k in range(DEGREE - 2, -1, -1):
+        h = h * u + t.piece.back[i, k]
+    return h * u, h * u
 
 
-@jit
-def put(t: ElementTables, m: ElementsState[ElementState], j: int, s: Scalar) -> None:
-    """Put element j at the value s of the curve."""
-    n = m.element.c.shape[1]
-    i = piece_at(t, 1, s)
-    u = s - t.piece[i, 1]
-    h: Scalar = t.piece[i, 2 * n + 1]
-    for k in range(2 * n, n + 1, -1):
-        h = h * u + t.piece[i, k]
-    h = h * u
-    for k in range(n):
-        m.element.c[j, k] = t.piece[i, 2 + k]
-    for k in range(n - 1, 0, -1):  # the piece's polynomial about h: its value there, then its coefficients
-        m.element.c[j, k - 1] = m.element.c[j, k - 1] + h * m.element.c[j, k]
-    m.element.level[j] = t.piece[i, 1] + h * m.element.c[j, 0]
-    for first in range(1, n):
-        for k in range(n - 1, first - 1, -1):
-            m.element.c[j, k - 1] = m.element.c[j, k - 1] + h * m.element.c[j, k]
-    m.element.place[j] = t.piece[i, 0] + h
-    last = len(t.piece) - 1
-    m.element.until[j] = t.piece[i + 1, 0] - m.element.place[j] if i < last else h - h
+@jit(inline=True)
+def distance(t: ElementTables, j: int, way: Scalar) -> Scalar:
+    """A move of the input in widths of element j."""
+    return way * t.element.inverse_width[j]
 
 
-@jit
-def unload(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
-    """Bring every element to rest at z = 0, with its input at w."""
-    m.turned[0] = w
-    m.upward[0] = 1
-    for j in range(len(t.element)):
-        m.element.high[j] = m.element.low[j] = w - w
-        put(t, m, j, m.element.high[j])
+@jit(inline=True)
+def amount(t: ElementTables, j: int, s: Scalar) -> Scalar:
+    """What element j contributes to the sum."""
+    return t.element.amplitude[j] * s
 
 
-@jit
-def turn(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> None:
-    """Turn every element at the input w. Its s changes sign: exactly, with a rounding remainder."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    for j in range(len(t.element)):
-        more, _ = gained(t, m, j, way * t.element.inverse_width[j])
-        high = m.element.high[j] + more
-        part = high - m.element.high[j]
-        low = m.element.low[j] + ((m.element.high[j] - (high - part)) + (more - part))
-        whole = high + low
-        m.element.low[j] = whole - high - low
-        m.element.high[j] = -whole
-        last = t.piece[len(t.piece) - 1, 1]
-        if whole > last or whole < -last:
-            m.element.high[j] = -last if whole > last else last
-            m.element.low[j] = whole - whole
-        put(t, m, j, m.element.high[j])
-    m.turned[0] = w
-    m.upward[0] = 1 - m.upward[0]
+@jit(inline=True)
+def weighed(t: ElementTables, j: int, slope: Scalar) -> Scalar:
+    """What element j contributes to the slope of the sum."""
+    return t.element.weight[j] * slope
 
 
-@jit
-def joined(t: ElementTables, m: ElementsState[ElementState], w: Scalar) -> tuple[Scalar, Scalar]:
-    """The sum of the elements with their input at w, and its slope."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    total: Scalar = way - way
-    slope: Scalar = total
-    for j in range(len(t.element)):
-        more, steep = gained(t, m, j, way * t.element.inverse_width[j])
-        total = total + t.element.amplitude[j] * (m.element.high[j] + more + m.element.low[j])
-        slope = slope + t.element.weight[j] * steep
-    return (total if m.upward[0] else -total), slope
-
-
-ELEMENTS = ElementsPart(of, Elements(joined, turn, unload), late("bouc_wen"))
+ELEMENTS = ElementsPart(
+    of, functions(product, product, same, share, back, distance, amount, weighed), late("bouc_wen")
+)
 """Elements in parallel with the plays as a part of the chain."""

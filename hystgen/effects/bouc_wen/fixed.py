@@ -15,8 +15,8 @@ import numpy as np
 from hystgen.arithmetic.factors import factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
-from hystgen.effects.bouc_wen.compensator import drifted
-from hystgen.effects.bouc_wen.model import BoucWenElements, DahlElements
+from hystgen.effects.bouc_wen.compensator import drifted, functions
+from hystgen.effects.bouc_wen.model import ParallelElements
 from hystgen.effects.bouc_wen.pieces import CurvePieces, pieces
 from hystgen.effects.plays import (
     Elements,
@@ -25,8 +25,8 @@ from hystgen.effects.plays import (
     FixedElementState,
     FixedElementTables,
     FixedPiece,
+    Tilt,
 )
-from hystgen.plays.slots import Reals
 
 UNIT = 44
 """Bits of places and values."""
@@ -52,8 +52,9 @@ FARTHEST = 2 ** (62 - SUMMED)
 ALLOWED = 2.0**-30
 """Error allowed for the curve: about that of a slope with `SLOPE` bits over a quarter of a width."""
 
-FAR = 2**49
-"""[2^-44 widths] Largest distance: 32 widths, behind which the curve is level within `ALLOWED`, from any place."""
+WIDTHS = 127
+"""[widths] Largest distance, by the bits of a number to be multiplied; behind 32, the curve is level within `ALLOWED`,
+from any place. Derived."""
 
 
 @functools.cache
@@ -61,9 +62,11 @@ def _pieces(exponent: float, balance: float) -> CurvePieces:
     return pieces(exponent, balance, DEGREE, ALLOWED, 2.0 ** (31 - UNIT))
 
 
-def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straight: float) -> FixedElementTables:
-    """Tables for inputs in steps of `step` and a sum in steps of `unit`, straight over a distance. Raises
-    OverflowError."""
+def of(
+    effect: ParallelElements, ends: tuple[float, float], step: float, unit: float, straight: float
+) -> FixedElementTables:
+    """Tables for inputs between `ends` in steps of `step` and a sum in steps of `unit`, straight over a distance.
+    Raises OverflowError."""
     found = _pieces(*effect.law)
     wide = np.diff(found.begin)
     scale = UNIT - 32 + np.frexp(wide)[1]  # lengths are powers of 2
@@ -82,13 +85,15 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straigh
         lifts = [lifted(each, 0) for each in values.tolist()]
         return [factor(each / 2.0**more) for each, more in zip(values.tolist(), lifts, strict=True)], lifts
 
-    weights, widths = np.array(effect.weights), np.array(effect.widths)
+    weights, widths, drive, lean, top = effect.tilted(*ends)
+    if np.any(lean) and np.ptp(ends) > WIDTHS * np.min(widths):
+        raise OverflowError(f"the range of the plays' input is more than {WIDTHS} widths of a tilted element")
     ratio = 2.0**UNIT * step / widths
     distance, distance_lift = scaled(ratio)
-    amplitude, amplitude_lift = scaled(weights * widths / unit / 2.0**UNIT)
-    weight, weight_lift = scaled(weights * step / unit / 2.0 ** (SLOPE - STEEP))
+    amplitude, amplitude_lift = scaled(weights * drive * widths / unit / 2.0**UNIT)
+    weight, weight_lift = scaled(weights * drive * step / unit / 2.0 ** (SLOPE - STEEP))
     begin, level = (np.rint(np.ldexp(each, UNIT)).astype(np.int64).tolist() for each in (found.begin, found.level))
-    far = np.minimum(np.floor(FAR / ratio), 2**40).astype(np.int64).tolist()
+    far = np.minimum(np.floor(WIDTHS * 2.0**UNIT / ratio), 2**40).astype(np.int64).tolist()
     level_on = [[0] * DEGREE]  # behind the last piece
     pieces_of = zip(
         begin, level, [*share, (0, 21)], [*up.tolist(), *level_on], [*back.tolist(), *level_on],
@@ -96,38 +101,29 @@ def of(effect: BoucWenElements | DahlElements, step: float, unit: float, straigh
     )
     elements = zip(distance, amplitude, weight, far, distance_lift, amplitude_lift, weight_lift, strict=True)
     most = math.floor(min(straight / step, FARTHEST))
-    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), most)
+    leans, tops = (np.rint(each).astype(np.int64) for each in (np.ldexp(lean / drive, SLOPE), top / step))
+    tilt = zip(leans.tolist(), tops.tolist(), (leans << UNIT - SLOPE).tolist(), strict=True) if np.any(lean) else ()
+    base = np.rint([weights * widths @ lean / unit]).astype(np.int64)
+    return FixedElementTables(FixedPiece.of(pieces_of), FixedElement.of(elements), Tilt.of(tilt), base, most)
 
 
-def error(effect: BoucWenElements | DahlElements) -> float:
-    """Bound on the error of the sum of the elements, output units."""
+def error(effect: ParallelElements, low: float, high: float) -> float:
+    """Bound on the error of the sum of the elements, output units, for inputs within a range."""
     found = _pieces(*effect.law)
-    size = float(np.abs(effect.weights) @ np.array(effect.widths))
+    weights, widths, drive, lean, _ = effect.tilted(low, high)
     rounded = 2.0**-SLOPE * DEGREE
-    return size * drifted(effect.law[0], found.error + rounded, found.slip + 2.0 * rounded)
+    slip = found.slip + 2.0 * rounded + 2.0**-SLOPE * (1.0 + (high - low) / widths) * (lean != 0.0)
+    each = [drifted(effect.law[0], found.error + rounded, x) for x in slip.tolist()]
+    return float(np.abs(weights) * widths * drive @ np.array(each))
 
 
 # ---------------------------------------------------------------- elements.c
 
 
 @jit
-def piece_at(begins: Reals, x: int) -> int:
-    """The piece in which a place or a value of the curve lies, given where pieces begin."""
-    low = 0
-    high = len(begins)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if x < begins[middle]:
-            high = middle
-        else:
-            low = middle
-    return low
-
-
-@jit
-def share_of(x: int, scale: int) -> int:
+def share_of(pieces: FixedPiece | FixedElementState, i: int, x: int) -> int:
     """A distance x >= 0 from the begin of a piece, over its length, with 31 bits."""
-    return min(x >> scale, 2**31 - 1)
+    return min(x >> pieces.scale[i], 2**31 - 1)
 
 
 @jit
@@ -143,60 +139,6 @@ def distance(t: FixedElementTables, j: int, way: int) -> int:
     inside = min(max(way, -far), far)
     by = t.element.distance
     return times(inside << t.element.distance_lift[j], by.mantissa[j], by.shift[j])
-
-
-@jit
-def gained(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, x: int) -> tuple[int, int]:
-    """Change of s of element j over the distance x since its last turn, and the curve's slope there without its `STEEP`
-    lowest bits; backwards the curve goes on straight."""
-    n = m.element.c.shape[1]
-    if x < 0:
-        return times(x, m.element.c[j, 0], SLOPE), m.element.c[j, 0] >> STEEP
-    if x < m.element.until[j]:
-        h = share_of(x, m.element.scale[j])
-        slope = m.element.c[j, n - 1]
-        steep = slope >> STEEP
-        for k in range(n - 2, -1, -1):
-            slope = m.element.c[j, k] + part(slope, h)
-            steep = part(steep, h) + (slope >> STEEP)
-        return times(x, slope, SLOPE), steep
-    i = piece_at(t.piece.begin, m.element.place[j] + x)
-    on = m.element.place[j] + x - t.piece.begin[i]
-    if i == len(t.piece) - 1:
-        return t.piece.level[i] - m.element.level[j], 0
-    h = share_of(on, t.piece.scale[i])
-    slope = t.piece.up[i, n - 1]
-    steep = slope >> STEEP
-    for k in range(n - 2, -1, -1):
-        slope = t.piece.up[i, k] + part(slope, h)
-        steep = part(steep, h) + (slope >> STEEP)
-    return t.piece.level[i] + times(on, slope, SLOPE) - m.element.level[j], steep
-
-
-@jit
-def put(t: FixedElementTables, m: ElementsState[FixedElementState], j: int, s: int) -> None:
-    """Put element j at the value s of the curve."""
-    n = m.element.c.shape[1]
-    last = len(t.piece) - 1
-    i = piece_at(t.piece.level, s)
-    g = times((s - t.piece.level[i]) << t.piece.lift[i], t.piece.share.mantissa[i], t.piece.share.shift[i])
-    g = min(g, 2**31 - 1)
-    slope = t.piece.back[i, n - 1]
-    for k in range(n - 2, -1, -1):
-        slope = t.piece.back[i, k] + part(slope, g)
-    h = min(max((slope * g + 2 ** (BACK - 1)) >> BACK, 0), 2**31 - 1)
-    x = h << t.piece.scale[i]
-    for k in range(n):
-        m.element.c[j, k] = t.piece.up[i, k]
-    for k in range(n - 1, 0, -1):  # the slope at h, then the other coefficients
-        m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
-    m.element.level[j] = t.piece.level[i] + times(x, m.element.c[j, 0], SLOPE)
-    for first in range(1, n):
-        for k in range(n - 1, first - 1, -1):
-            m.element.c[j, k - 1] = m.element.c[j, k - 1] + part(m.element.c[j, k], h)
-    m.element.place[j] = t.piece.begin[i] + x
-    m.element.scale[j] = t.piece.scale[i]
-    m.element.until[j] = t.piece.begin[i + 1] - m.element.place[j] if i < last else 0
 
 
 @jit
@@ -218,46 +160,55 @@ def depart(t: FixedElementTables, m: ElementsState[FixedElementState], w: int, t
 
 
 @jit
+def back(
+    t: FixedElementTables, m: ElementsState[FixedElementState], i: int, j: int, s: int
+) -> tuple[int, int]:
+    """The distance from the begin of piece i at which the curve is s, and its share of the piece's length, by whose
+    scale element j goes on."""
+    g = times((s - t.piece.level[i]) << t.piece.lift[i], t.piece.share.mantissa[i], t.piece.share.shift[i])
+    g = min(g, 2**31 - 1)
+    slope = t.piece.back[i, DEGREE - 1]
+    for k in range(DEGREE - 2, -1, -1):
+        slope = t.piece.back[i, k] + part(slope, g)
+    h = min(max((slope * g + 2 ** (BACK - 1)) >> BACK, 0), 2**31 - 1)
+    m.element.scale[j] = t.piece.scale[i]
+    return h << t.piece.scale[i], h
+
+
+@jit(inline=True)
+def by_slope(x: int, slope: int) -> int:
+    """x times a slope."""
+    return times(x, slope, SLOPE)
+
+
+@jit(inline=True)
+def steep(slope: int) -> int:
+    """A slope without its `STEEP` lowest bits."""
+    return slope >> STEEP
+
+
+@jit
+def amount(t: FixedElementTables, j: int, s: int) -> int:
+    """What element j contributes to the sum."""
+    size = t.element.amplitude
+    return times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j]
+
+
+summed, turned, unloaded = functions(part, by_slope, steep, share_of, back, distance, amount, sloped)
+
+
+@jit
 def unload(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
     """Bring every element to rest at z = 0, with its input at w."""
-    m.turned[0] = w
-    m.upward[0] = 1
-    for j in range(len(t.element)):
-        m.element.s[j] = 0
-        put(t, m, j, 0)
+    unloaded(t, m, w)
     depart(t, m, w, 0)
 
 
 @jit
 def turn(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
     """Turn every element at the input w: its s changes sign."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    last = t.piece.level[len(t.piece) - 1]
-    for j in range(len(t.element)):
-        s = m.element.s[j] + gained(t, m, j, distance(t, j, way))[0]
-        m.element.s[j] = -min(max(s, -last), last)
-        put(t, m, j, m.element.s[j])
-    m.turned[0] = w
-    m.upward[0] = 1 - m.upward[0]
+    turned(t, m, w)
     depart(t, m, w, m.asked[0] + m.slope[0] * (w - m.found[0]))
-
-
-@jit
-def approach(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -> None:
-    """Compute the sum of the elements with their input at w, and its slope."""
-    way = w - m.turned[0] if m.upward[0] else m.turned[0] - w
-    total = 0
-    slope = 0
-    for j in range(len(t.element)):
-        more, steep = gained(t, m, j, distance(t, j, way))
-        size = t.element.amplitude
-        s = m.element.s[j] + more
-        total = total + (times(s, size.mantissa[j], size.shift[j]) << t.element.amplitude_lift[j])
-        slope = slope + sloped(t, j, steep)
-    m.found[0] = w
-    m.asked[0] = total if m.upward[0] else -total
-    m.slope[0] = slope
-    m.departs[0] = 0
 
 
 @jit
@@ -266,7 +217,9 @@ def joined(t: FixedElementTables, m: ElementsState[FixedElementState], w: int) -
     computed there if that is not near or they have turned since."""
     on = w - m.found[0]
     if on != 0 and (m.departs[0] or on > t.straight or on < -t.straight):
-        approach(t, m, w)
+        m.found[0] = w
+        m.asked[0], m.slope[0] = summed(t, m, w)
+        m.departs[0] = 0
         on = 0
     return m.asked[0] + m.slope[0] * on, 0
 

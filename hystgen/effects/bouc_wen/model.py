@@ -1,8 +1,8 @@
-"""Elements in parallel with the plays whose minor loops stay open: Bouc-Wen and Dahl."""
+"""Elements in parallel with the plays whose minor loops stay open: Bouc-Wen, Dahl and Duhem."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
@@ -41,6 +41,10 @@ BALANCES, EXPONENTS = (0.51, 3.0), (1.0, 5.0)
 STARTS = 5
 """Number of widths from which a search starts, each about three times the previous one."""
 
+MOST_TILT = 0.98
+"""[1] Largest tilt tried, as a share of that at which z has no limit at one end of the drive range: just below, so
+that a written model has one. The plant of `test_elements::test_a_duhem_plant_is_found` is at 0.44."""
+
 DAHL = "bouc_wen, dahl"
 
 
@@ -58,23 +62,43 @@ def place_of(above: Half, below: Half, s: float) -> float:
     return -distance(below, -s) if s < 0.0 else distance(above, s)
 
 
+def at_rest(w: float, width: float, tilt: float) -> Array:
+    """Memory of an element at rest: its direction, its input w at the last turn and now, and where it began to move
+    there: its place on the curve or, if tilted, s, which is `z/width + tilt width` in its direction."""
+    return np.array([1.0, w, w, tilt * width])
+
+
 @jit
-def element(w: Array, width: float, weight: float, above: Half, below: Half, total: Array) -> None:
-    """Add `weight z` to `total`, for the input `w`, from z = 0 at its first sample.
+def reached(m: Array, w: float, width: float, tilt: float, above: Half, below: Half) -> float:
+    """s of an element with its input at w, without a turn on the way."""
+    x = m[0] * (w - m[1]) / width
+    if tilt == 0.0:
+        return reach(above, below, m[3] + x)
+    return float(m[3] - (1.0 + tilt * m[1] - m[3]) * math.expm1(-x) + tilt * (w - m[1]))
 
-    Between turns the place on the curve is that of the last turn plus the distance from there, so that no rounding
-    errors accumulate over the samples.
+
+@jit
+def moved(m: Array, w: float, width: float, tilt: float, above: Half, below: Half) -> float:
+    """z/width of an element after its input has moved to w.
+
+    Between turns the element follows its curve from the last turn on, so that no rounding errors accumulate over the
+    samples.
     """
-    way, turned, begin = 1.0, w[0], 0.0
+    if m[0] * (w - m[2]) < 0.0:
+        s = reached(m, m[2], width, tilt, above, below)
+        m[0], m[1], m[3] = -m[0], m[2], place_of(above, below, -s) if tilt == 0.0 else -s
+    m[2] = w
+    return float(m[0] * reached(m, w, width, tilt, above, below) - tilt * width)
+
+
+@jit
+def element(m: Array, w: Array, width: float, tilt: float, weight: float, above: Half, below: Half, out: Array) -> None:
+    """Add `weight z` to `out`, for the input `w`, from rest at its first sample."""
     for k in range(1, len(w)):
-        move = w[k] - w[k - 1]
-        if way * move < 0.0:
-            s = reach(above, below, begin + way * (w[k - 1] - turned) / width)
-            begin, turned, way = place_of(above, below, -s), w[k - 1], -way
-        total[k] += weight * width * way * reach(above, below, begin + way * (w[k] - turned) / width)
+        out[k] += weight * width * moved(m, w[k], width, tilt, above, below)
 
 
-class _ParallelElements(Effect):
+class ParallelElements(Effect):
     name: Literal["bouc_wen"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.PLAYS
@@ -92,28 +116,41 @@ class _ParallelElements(Effect):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """A problem unless there is one width for each weight."""
+        """A problem unless there is one width for each weight, and a tilt, if there are any."""
         yield from not_as_many("widths", self.widths, "weights", self.weights)
+        yield from not_as_many("tilts", self.leans, "weights", self.weights)
 
     @property
-    @abstractmethod
     def law(self) -> tuple[float, float]:
         """Exponent and balance."""
+        return 1.0, 1.0
+
+    @property
+    def leans(self) -> tuple[float, ...]:
+        """t_j, by which the drive of each element is tilted."""
+        tilts: tuple[float, ...] = getattr(self, "tilts", (0.0,) * len(self.weights))
+        return tilts
+
+    def tilted(self, low: float, high: float) -> tuple[Array, Array, Array, Array, Array]:
+        """Weights, widths, largest drives `1 + t_j w` in a range, their changes over a width, and the w of each."""
+        weights, widths, tilts = map(np.array, (self.weights, self.widths, self.leans))
+        top = np.where(tilts > 0.0, high, low)
+        return weights, widths, 1.0 + tilts * top, tilts * widths, top
 
     def parallel(self, w: Array) -> Array:
         """`sum k_j z_j` (N,), from z_j = 0 at the first sample."""
         total = np.zeros(len(w))
-        for weight, width in zip(self.weights, self.widths, strict=True):
-            element(np.ascontiguousarray(w), width, weight, *halves(*self.law), total)
+        for weight, width, tilt in zip(self.weights, self.widths, self.leans, strict=True):
+            m = at_rest(float(w[0]), width, tilt)
+            element(m, np.ascontiguousarray(w), width, tilt, weight, *halves(*self.law), total)
         return total
 
-
     def transients(self, run: Run) -> Array:
-        """`exp(-travel/width_j)`: exact for Dahl's law, whose equation is linear in z while the input moves one way."""
+        """`exp(-travel/width_j)`: exact for the laws of Dahl and Duhem, linear in z while the input moves one way."""
         return np.asarray(np.exp(-run.travelled / np.array(self.widths)[:, None]))
 
 
-class BoucWenElements(_ParallelElements):
+class BoucWenElements(ParallelElements):
     """Bouc-Wen elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, z_j in units of the plays' input w.
 
         dz = dw (1 - (b sgn(z dw) + 1 - b) |z/width|^n)
@@ -147,27 +184,17 @@ class BoucWenElements(_ParallelElements):
             return cls(name="bouc_wen", weights=weights, widths=widths, exponent=exponent, balance=balance)
 
         more = np.array([[*np.log10(BALANCES), 0.0], [*EXPONENTS, 1.0]])
-
-        def freed(label: str, count: int) -> Candidate:
-            straight = _candidate(label, 1, build, more[:count])
-            return replace(straight, beyond=DAHL, grown=lambda x: np.append(x, more[:count, 2]))
-
-        free = [freed("bouc_wen, any balance", 1), freed("bouc_wen, any balance and exponent", 2)]
-        return free if about.speeds else []
+        labels = "bouc_wen, any balance", "bouc_wen, any balance and exponent"
+        return [_freed(label, build, more[:k]) for k, label in enumerate(labels, 1) if about.speeds]
 
 
-class DahlElements(_ParallelElements):
+class DahlElements(ParallelElements):
     """Dahl's friction elements in parallel with the plays: `y = PI[w] + sum k_j z_j`, `dz = dw (1 - sgn(dw) z/width)`.
 
     The Bouc-Wen element with exponent and balance 1 (P. R. Dahl, A solid friction model, Aerospace Corporation, 1968).
     """
 
     shape: Literal["dahl"] = Field(description="Dahl's law: exponent 1 and balance 1")
-
-    @property
-    def law(self) -> tuple[float, float]:
-        """Exponent and balance."""
-        return 1.0, 1.0
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -187,6 +214,41 @@ class DahlElements(_ParallelElements):
             replace(_candidate("bouc_wen, two dahl", 2, build, none), beyond=DAHL, grown=grown),
         ]
         return found if about.speeds else []
+
+
+class DuhemElements(ParallelElements):
+    """Dahl's elements with a tilted drive: `dz = dw (1 + t w) - |dw| z/width`.
+
+    With `y = p w + k z` these are Duhem plants of Coleman and Hodgdon, `dy = |dw| (p w - y)/width + (c + d w) dw` with
+    c = p + k and d = k t (A constitutive relation for rate-independent hysteresis in ferromagnetically soft materials,
+    Int. J. Eng. Sci. 24, 1986).
+    """
+
+    shape: Literal["duhem"] = Field(description="Dahl's law with a tilted drive")
+    tilts: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
+        description="as many as weights, t_j, 1 / input unit of the plays", examples=[[-0.005]]
+    )
+
+    def problems_within(self, low: float, high: float) -> Iterator[str]:
+        """A problem for each tilt with which z would somewhere turn back while the input moves on."""
+        for j, (tilt, width) in enumerate(zip(self.tilts, self.widths, strict=False)):
+            room, side = (width - low, "below ") if tilt > 0.0 else (width + high, "above -")
+            if not abs(tilt) * room < 1.0:
+                message = f"tilts[{j}] must be {side}{1.0 / room:.6g}, not {tilt:.6g}: for inputs of the plays"
+                yield f"{message} w = {low:.6g} .. {high:.6g}, 1 + tilt w has to exceed |tilt| times the width"
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One element; tried if Dahl's element helps; none at a single speed."""
+        middle, half = 0.5 * sum(about.drive), 0.5 * (about.drive[1] - about.drive[0])
+
+        def build(x: Array) -> DuhemElements:
+            (weight,), (width,) = _elements(x[None, :2], about)
+            lean = x[2] / max(half + width, abs(middle))  # about the middle: at 1 or -1, z has no limit at one end
+            tilts = (lean / (at_0 := 1.0 - lean * middle),)
+            return cls(name="bouc_wen", shape="duhem", weights=(weight * at_0,), widths=(width,), tilts=tilts)
+
+        return [_freed("bouc_wen, duhem", build, np.array([[-MOST_TILT, MOST_TILT, 0.0]]))] if about.speeds else []
 
 
 def _elements(x: Array, about: About) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -213,9 +275,14 @@ def _candidate(label: str, count: int, build: Callable[[Array], Effect], more: A
     )
 
 
-SHAPES: Sequence[type[_ParallelElements]] = (BoucWenElements, DahlElements)
+def _freed(label: str, build: Callable[[Array], Effect], more: Array) -> Candidate:
+    """One element with further parameters than Dahl's, which begin where it is Dahl's."""
+    return replace(_candidate(label, 1, build, more), beyond=DAHL, grown=lambda x: np.append(x, more[:, 2]))
+
+
+SHAPES: Sequence[type[ParallelElements]] = (BoucWenElements, DahlElements, DuhemElements)
 
 
 def load() -> None:
     """Compile the elements, or load them from the cache, by running them on two samples."""
-    element(np.array([0.0, 1.0]), 1.0, 1.0, *halves(1.0, 1.0), np.zeros(2))
+    element(at_rest(0.0, 1.0, 0.0), np.array([0.0, 1.0]), 1.0, 0.0, 1.0, *halves(1.0, 1.0), np.zeros(2))

@@ -29,7 +29,6 @@ MOST_SUM = 7.5
 MOST_PIECES = 2000
 """Maximum number of pieces, a reserve: float64 takes some 100."""
 
-
 LARGEST = 1e36
 """Largest coefficient: float32 holds numbers up to 3.4e38."""
 
@@ -50,16 +49,25 @@ class CurvePieces(NamedTuple):
     slip: float
 
 
-def largest(width: float, exponent: float, balance: float, span: float) -> float:
-    """Largest s of an element whose input stays within `span`, after any history from rest: S, which comes after a move
-    over the span from s = -S."""
-    above, below = halves(exponent, balance)
-    s = 0.0
-    while True:
-        more = reach(above, below, place_of(above, below, -s) + span / width)
-        if not more > s + 1e-15:
-            return more
-        s = more
+def extremes(
+    shape: tuple[float, float], law: tuple[float, float], low: float, high: float
+) -> tuple[tuple[float, float], float]:
+    """Of an element with a `shape`, width and tilt, whose input stays within a range: -z at the smallest input and z at
+    the largest after a move there from rest at the other end, which no other history exceeds anywhere on the way; and
+    the largest change of z per change of the input, right after a reversal."""
+    (width, tilt), (exponent, balance) = shape, law
+    span = (high - low) / width
+    if not tilt:
+        s = reach(*halves(exponent, balance), span)
+        return (width * s, width * s), 1.0 + (2.0 * balance - 1.0) * s**exponent
+    ends, steepest = [], 0.0
+    for lean, begin in ((-tilt * width, 1.0 + tilt * high), (tilt * width, 1.0 + tilt * low)):
+        rest = begin - lean
+        peak = min(max(math.log(-0.5 * rest / lean), 0.0), span) if lean < 0.0 else span
+        moved = [lean * x - rest * math.expm1(-x) for x in (peak, span)]
+        steepest = max(steepest, begin, begin + lean * peak + moved[0])
+        ends.append(width * moved[1])
+    return (ends[0], ends[1]), steepest
 
 
 @functools.lru_cache(maxsize=16)

@@ -36,7 +36,6 @@ LONG_STEP = 2.0
 lead, and would be 13 with steps half as long. The lead leaves an error of 0.3 % on a sine of 40 steps. Set by:
 benchmarks/chosen_numbers.py lag."""
 
-
 MOST_LED = 2.0
 """[times the previous move] Largest move of a target that is led in full in front of two branches: otherwise a step is
 led beyond its end, from where the drive has to turn back. A step of 0.2 um out of a slow ramp overshoots by 0.002 um,

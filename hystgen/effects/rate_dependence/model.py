@@ -35,7 +35,6 @@ Places = NDArray[np.intp]
 LARGE, TOGETHER = 10_000, 4
 """[samples, plays] From this many samples on, threads share the plays of a nonlinear dashpot, this many at a time."""
 
-
 MOST_PIECES = 1000
 """Maximum number of pieces per step of a nonlinear relaxation."""
 

@@ -14,7 +14,6 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
 """Starts inside the output range: a limit beyond the measured range has no effect, even if it changes slightly."""
 
-
 MIDDLE = 0.5
 """[fraction of the output range from its lower end] Centre at which a search starts."""
 
