@@ -291,7 +291,7 @@ def test_faults_raise_alarms(
 # Faults put into blocks of effects in q31, and the alarm each must raise
 EFFECT_FAULTS = [
     ("crept", r"\(settled - state\[i\]\.next\) >> t->drop", "settled - state[i].next", "signed downcast"),
-    ("crept", r"(crept_creep_1 = \{[^;]*, )\d+(, \d+, 3,)", r"\g<1>25\2", "signed overflow"),
+    ("crept", r"(crept_creep_1 = \{[^;]*, )\d+(, \d+, 3\s)", r"\g<1>25\2", "signed overflow"),
     ("aged", r"\(travel - piece->begin\) >> piece->drop", "travel - piece->begin", "signed downcast"),
     ("drifted", r"(\(t->slope \+ self->gained\)) \* ahead", r"\1 * self->part", "signed overflow"),
     ("heated", r"amount, t->coarse", "amount, 0", "signed downcast"),

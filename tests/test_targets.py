@@ -213,15 +213,20 @@ def deepest(name: str, frames: dict[str, int], calls: dict[str, set[str]]) -> in
 
 WITH_BRAKES = CHAINS | {"braked": BRAKED, "steady": STEADY, "calm": CALM}
 
+ELEMENT_STACK = {"forgetful": 216, "gliding": 200, "sloping": 232}
+"""Stack of models with elements: at a turn each element is put on its curve anew, a polynomial of degree 7, or of numbers
+in two words in fixed point, which takes 64 to 140 bytes on top of those of a step."""
+
 
 @pytest.mark.slow(one_in=6)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", WITH_BRAKES)
-def test_models_with_effects_need_at_most_128_bytes_of_stack(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """On a Cortex-M4F, this is the deepest chain of calls from any function of the interface, reached or not."""
+def test_models_with_effects_need_little_stack(name: str, arithmetic: str, tmp_path: Path) -> None:
+    """At most 128 bytes without elements. On a Cortex-M4F, this is the deepest chain of calls from any function of the
+    interface, reached or not."""
     operators = ("inverse",) if name in INVERSE_ALONE else ("both", "inverse")
     used = stack(tmp_path, WITH_BRAKES[name], arithmetic, "loop", operators)
-    assert max(used.values()) <= 128, used
+    assert max(used.values()) <= ELEMENT_STACK.get(name, 128), used
 
 
 CORNER_STACK = {("led", "q31"): 136, ("everything", "q31"): 136, ("everything", "float32"): 136}

@@ -88,9 +88,7 @@ class Structures(ConstantTable):
         rows = tuple(rows)
         lines = filled(rows[0]).splitlines()
         if declared.endswith("]"):
-            each = [f"{{{', '.join(row)}}}" for row in rows]
-            whole = filled(each).splitlines()
-            lines = whole if len(whole) == 1 else [*(f"    {row}," for row in each[:-1]), f"    {each[-1]}"]
+            lines = filled(f"{{{', '.join(row)}}}" for row in rows).splitlines()
         text = constant(declared, lines)
         return cls(name, words + text, ((kind, len(rows)),), declared, rows, words)
 

@@ -17,7 +17,7 @@ from hystgen.basics.problems import EffectsError, printable
 from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, BlockKind
-from hystgen.emission.runtime import Piece
+from hystgen.emission.runtime import Field, Piece
 from hystgen.emission.text import WIDTH
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
 
 _TYPE = re.compile(r"typedef struct \{([^{}]*)\} (hystgen_\w+);")
 _FUNCTION = re.compile(r"static [\w *]*?\b(hystgen_\w+)\(([^(){}]*)\) \{")
+_MEMBER = re.compile(r"(?:hystgen_)?(unsigned int|\w+(?: \*)?) ?(\w+)(?:\[(\w+)\])?")
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
 
@@ -160,7 +161,15 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
             continue
         name = found[2] if whole.startswith("typedef") else found[1]
         comment = text[_above(text, behind, begin) : begin]
-        yield Piece(name, f"{comment}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name})
+        members = _members(found[1]) if whole.startswith("typedef") else ()
+        yield Piece(name, f"{comment}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name}, tuple(members))
+
+
+def _members(body: str) -> Iterator[Field]:
+    """The members of a structure."""
+    for each in body.split(";"):
+        if found := _MEMBER.fullmatch(each.strip()):
+            yield Field(found[1], found[2], "", found[3] or "")
 
 
 def _above(text: str, behind: int, begin: int) -> int:

@@ -241,7 +241,8 @@ static hystgen_real_t hystgen_gained(const hystgen_element_t *e, hystgen_real_t 
     if (x < e->until) {
         return hystgen_polynomial(e->c, x, slope);
     }
-    const hystgen_piece_t *piece = &hystgen_piece[hystgen_piece_at(false, e->place + x)];
+    const unsigned int i = hystgen_piece_at(false, e->place + x);
+    const hystgen_piece_t *piece = &hystgen_piece[i];
     const hystgen_real_t h = e->place + x - piece->begin;
     const hystgen_real_t value = piece->level + hystgen_polynomial(piece->up, h, slope) - e->level;
 #ifdef HYSTGEN_HAS_TILT
@@ -264,7 +265,8 @@ static inline hystgen_real_t hystgen_element_at(const hystgen_element_t *e, hyst
    exactly, in floating point with a rounding remainder. */
 static void hystgen_element_turn(unsigned int j, hystgen_element_t *e, hystgen_sum_t x,
                                  hystgen_play_t w) {
-    const hystgen_sum_t last = hystgen_piece[HYSTGEN_PIECES - 1u].level;
+    const unsigned int end = HYSTGEN_PIECES - 1u;
+    const hystgen_sum_t last = hystgen_piece[end].level;
     hystgen_narrow_t slope;
 #ifdef HYSTGEN_FIXED
     const hystgen_sum_t whole = hystgen_element_at(e, x, &slope);

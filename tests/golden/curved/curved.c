@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 1f5b7142efe6c5bc194ef6fa5ccc8d0d020a5fac5e83f3ce4af48a4e4d8358c4, without this line
+ * Text: sha256 f8b65cc6bd32d2cb27af6137976077c0b4843a9b648657d9492d02d775dccf30, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -360,8 +360,7 @@ static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w, in
 }
 
 static const curved_segment_t curved_model_segment[8] = {
-    {0, 0, 944078, 1192592039, 18},
-    {3563775496172LL, 3774874, 1730810, 1301009246, 19},
+    {0, 0, 944078, 1192592039, 18}, {3563775496172LL, 3774874, 1730810, 1301009246, 19},
     {10097365164112LL, 7549748, 2360195, 1908147262, 20},
     {19006799184152LL, 11324620, 2832234, 1590122718, 20},
     {29698125672668LL, 15099494, 3146927, 1431110295, 20},

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 83e2b324a97dc5e2447483d8154147a05f925c253c13218b96a7d8dcb861c47c, without this line
+ * Text: sha256 ab9c03afdfce7b7ce6956ae23d3d5680826f38121c8ba47c23634dbcfddc6059, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -317,14 +317,10 @@ PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_cor
 }
 
 static const plain_segment_t plain_inverse_segment[8] = {
-    {0.0f, 0.0f, 1.3888888f, 0.72f},
-    {0.64799273f, 0.8999945f, 0.75757575f, 1.32f},
-    {1.8359928f, 1.799996f, 0.5555556f, 1.8f},
-    {3.4559927f, 2.6999967f, 0.46296296f, 2.16f},
-    {5.399993f, 3.599997f, 0.41666666f, 2.4f},
-    {7.559993f, 4.499997f, 0.3968254f, 2.52f},
-    {9.827992f, 5.399997f, 0.3949447f, 2.532f},
-    {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
+    {0.0f, 0.0f, 1.3888888f, 0.72f}, {0.64799273f, 0.8999945f, 0.75757575f, 1.32f},
+    {1.8359928f, 1.799996f, 0.5555556f, 1.8f}, {3.4559927f, 2.6999967f, 0.46296296f, 2.16f},
+    {5.399993f, 3.599997f, 0.41666666f, 2.4f}, {7.559993f, 4.499997f, 0.3968254f, 2.52f},
+    {9.827992f, 5.399997f, 0.3949447f, 2.532f}, {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
 };
 static const plain_curve_t plain_inverse_curve = {
     plain_inverse_segment, {4.0f, 4.0f}, {3.9999723f, 3.9999723f}, {8.2056f, 8.2056f}

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 090626151eaef404a7f0bc6ad9f3e24e51d5c44dcd34f2ae713d00f8cf0f0ee9, without this line
+ * Text: sha256 477d7d05443fc0a229df8f43ffd75510c18431d36fb6d035e6fd37f61bf5b106, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -729,14 +729,10 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
 }
 
 static const two_branches_segment_t two_branches_inverse_segment[8] = {
-    {0.0f, 0.0f, 1.3888888f, 0.72f},
-    {0.6479896f, 0.8999921f, 0.75757575f, 1.32f},
-    {1.8359896f, 1.7999942f, 0.5555556f, 1.8f},
-    {3.4559896f, 2.6999953f, 0.46296296f, 2.16f},
-    {5.3999896f, 3.5999956f, 0.41666666f, 2.4f},
-    {7.5599895f, 4.4999957f, 0.3968254f, 2.52f},
-    {9.82799f, 5.399996f, 0.3949447f, 2.532f},
-    {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
+    {0.0f, 0.0f, 1.3888888f, 0.72f}, {0.6479896f, 0.8999921f, 0.75757575f, 1.32f},
+    {1.8359896f, 1.7999942f, 0.5555556f, 1.8f}, {3.4559896f, 2.6999953f, 0.46296296f, 2.16f},
+    {5.3999896f, 3.5999956f, 0.41666666f, 2.4f}, {7.5599895f, 4.4999957f, 0.3968254f, 2.52f},
+    {9.82799f, 5.399996f, 0.3949447f, 2.532f}, {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
 };
 static const two_branches_curve_t two_branches_inverse_curve = {
     two_branches_inverse_segment, {3.4028235e+38f, 3.4028235e+38f}, {3.4028235e+38f, 3.4028235e+38f}
