@@ -214,8 +214,8 @@ def deepest(name: str, frames: dict[str, int], calls: dict[str, set[str]]) -> in
 WITH_BRAKES = CHAINS | {"braked": BRAKED, "steady": STEADY, "calm": CALM}
 
 ELEMENT_STACK = {"forgetful": 216, "gliding": 200, "sloping": 232}
-"""Stack of models with elements: at a turn each element is put on its curve anew, a polynomial of degree 7, or of numbers
-in two words in fixed point, which takes 64 to 140 bytes on top of those of a step."""
+"""Stack of models with elements: at a turn each element is put on its curve anew, a polynomial of degree 7, or of
+numbers in two words in fixed point, which takes 64 to 140 bytes on top of those of a step."""
 
 
 @pytest.mark.slow(one_in=6)
