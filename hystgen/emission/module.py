@@ -170,8 +170,7 @@ def _tables(
     found = {}
     for own, table in reversed([*every.items()]):  # a table comes before those that name it
         if {own, f"hystgen{own.removeprefix(name)}"} & words:
-            types = members.types.get(table.kind)  # those that a user's C declares are not known
-            found[own] = table if types is None else table.keeping(types, named, members.whole)
+            found[own] = table.keeping(members.types.get(table.kind, {}), named, members.whole)
             words.update(re.findall(r"\w+", found[own].text))
             named |= members.named([found[own].text])
     return found

@@ -141,7 +141,7 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
 
 _TYPE = re.compile(r"typedef struct \{([^{}]*)\} (hystgen_\w+);")
 _FUNCTION = re.compile(r"static [\w *]*?\b(hystgen_\w+)\(([^(){}]*)\) \{")
-_MEMBER = re.compile(r"(?:hystgen_)?(unsigned int|\w+(?: \*)?) ?(\w+)(?:\[(\w+)\])?")
+_MEMBER = re.compile(r"(?:hystgen_)?(unsigned int|\w+(?: \*)?) ?(\w+)(?:\[(\w+)\])?;")
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
 
@@ -161,15 +161,8 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
             continue
         name = found[2] if whole.startswith("typedef") else found[1]
         comment = text[_above(text, behind, begin) : begin]
-        members = _members(found[1]) if whole.startswith("typedef") else ()
-        yield Piece(name, f"{comment}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name}, tuple(members))
-
-
-def _members(body: str) -> Iterator[Field]:
-    """The members of a structure."""
-    for each in body.split(";"):
-        if found := _MEMBER.fullmatch(each.strip()):
-            yield Field(found[1], found[2], "", found[3] or "")
+        members = tuple(Field(kind, member, "", size) for kind, member, size in _MEMBER.findall(found[1]))
+        yield Piece(name, f"{comment}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name}, members)
 
 
 def _above(text: str, behind: int, begin: int) -> int:
