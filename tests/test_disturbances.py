@@ -416,6 +416,17 @@ class TestWholeRecords:
         assert {each.kind for each in reported} == {"swapped_channels"}
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
 
+    def test_an_actuator_that_leads_has_no_exchanged_columns(self) -> None:
+        """All loops run clockwise, and in one record the model does not fit exchanged columns better."""
+        ahead, weights = (0.0, 20.0, 35.0, 50.0), tuple(9.0 * weight for weight in WEIGHTS)
+        given = []
+        for k, record in enumerate(records()):
+            late = brute_output(np.concatenate([HISTORY, record.v]), ahead, weights, 0.0)[len(HISTORY) :]
+            given.append(replace(record, y=1.8 * record.v - late + noise(len(record.v), 50 + k)))
+        kept, reported = check(given, weights)
+        assert reported == []
+        assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
+
     def test_exchanged_columns_without_a_loop(self) -> None:
         """The records move by less than the smallest threshold, so only the sensitivity tells."""
         small = [replace(r, v=50.0 + 0.01 * r.v, y=3.0 + 8e-4 * r.v + 0.01 * noise(len(r.v), 8)) for r in records()]

@@ -61,27 +61,25 @@ class Against:
 def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
     """The usable records, with None for each of the others, and the findings, at most one per record.
 
-    Swapped columns are put right; a record in other units, or with the output of another record, is left out. Faulty
-    samples do not affect these checks.
+    Swapped columns are put right, unless loops run the wrong way in records that are not swapped; a record in other
+    units, or with the output of another record, is left out. Faulty samples do not affect these checks.
     """
-    kept: list[Record | None] = []
-    seen: list[Record] = []
-    findings: list[Finding] = []
-    found: dict[int, Against] = {}
-    predicted: dict[int, Array] = {}
-    for k, record in enumerate(records):
-        plain = right = faults.smooth(record) if _whole(record) else record
-        if _moves(plain):
-            right, predicted[k], found[k] = _right_way_round(plain, predict)
-        swapped = right is not plain
-        if swapped:
-            findings.append(SwappedChannels(record.name))
-        kept.append(replace(record, v=np.asarray(record.y), y=record.v) if swapped else record)
-        seen.append(right)
-    records, judged = seen, list(found)
+    plain = [faults.smooth(record) if _whole(record) else record for record in records]
+    moving = [k for k, record in enumerate(plain) if _moves(record)]
+    right = {k: _right_way_round(plain[k], predict) for k in moving}
+    if any(one is plain[k] and seen.sense < 0.0 < seen.factor for k, (one, _, seen) in right.items()):
+        right = {k: _as_recorded(plain[k], predict) for k in moving}  # the actuator leads, and the model does not
+    swapped = {k for k in moving if right[k][0] is not plain[k]}
+    findings: list[Finding] = [SwappedChannels(records[k].name) for k in sorted(swapped)]
+    kept: list[Record | None] = [
+        replace(record, v=np.asarray(record.y), y=record.v) if k in swapped else record
+        for k, record in enumerate(records)
+    ]
+    predicted, found = {k: each[1] for k, each in right.items()}, {k: each[2] for k, each in right.items()}
+    records, judged = [right[k][0] if k in right else record for k, record in enumerate(plain)], list(found)
     widths = np.array([float(np.ptp(record.v)) for record in records])
-    moving = widths[widths > 0.0]
-    widest = float(np.max(moving[moving <= acceptance.OTHER_UNIT * np.median(moving)], initial=0.0))
+    wider = widths[widths > 0.0]
+    widest = float(np.max(wider[wider <= acceptance.OTHER_UNIT * np.median(wider)], initial=0.0))
     wide = [k for k in judged if np.ptp(records[k].v) > acceptance.WIDE_DRIVE * widest]
     for k in wide:
         other = _other(k, records, predicted, found)
@@ -164,10 +162,15 @@ def _area(v: Array, y: Array) -> float:
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
 
 
-def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
-    """A record with swapped columns put right, its prediction, and how the two compare."""
+def _as_recorded(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
+    """A record, its prediction, and how the two compare."""
     predicted = predict(record)
-    found = _against(record, predicted)
+    return record, predicted, _against(record, predicted)
+
+
+def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
+    """The same for a record whose columns are put right if they are swapped."""
+    _, predicted, found = _as_recorded(record, predict)
     if found.sense <= 0.0:
         assert record.y is not None
         swapped = replace(record, v=record.y, y=record.v)

@@ -81,8 +81,8 @@ def still(v: Array, least: int) -> list[tuple[int, int]]:
 
 def settled(item: Item) -> list[slice]:
     """The samples of each hold of a record after settling."""
-    share, holds = acceptance.HOLD_SETTLING, still(item.run.v, acceptance.HOLD_SAMPLES)
-    return [slice(first + int(share * (last - first)), last) for first, last in holds]
+    holds = still(item.run.v, acceptance.HOLD_SAMPLES)
+    return [slice(first + int(acceptance.HOLD_SETTLING * (last - first)), last) for first, last in holds]
 
 
 def stands_within(v: Array) -> float:
@@ -96,9 +96,8 @@ def stands_within(v: Array) -> float:
 def _holds(item: Item) -> list[tuple[float, int]]:
     """Variance and number of samples of each hold after settling."""
     parts = []
-    for first, last in still(item.run.v, acceptance.HOLD_SAMPLES):
-        begin = first + int(acceptance.HOLD_SETTLING * (last - first))
-        y, t = item.y[begin:last], item.run.t[begin:last]
+    for (first, _), part in zip(still(item.run.v, acceptance.HOLD_SAMPLES), settled(item), strict=True):
+        y, t = item.y[part], item.run.t[part]
         known = np.isfinite(y)
         if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2 or np.ptp(y[known]) == 0.0:
             continue  # too few samples, or all equal
