@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -23,6 +25,8 @@ from hystgen.compensator.chained import Compensator
 from hystgen.effects.base import Array, Run
 from hystgen.parameters.schema import Compensation
 
+T = TypeVar("T")
+
 SAMPLES = 800
 """[samples] Length of each kind of reference: the error found is then at least 0.79 times that with 3000, and takes
 half a second. Set by: benchmarks/chosen_numbers.py samples."""
@@ -35,14 +39,9 @@ SAID_BY = 10.0
 this: it is the order of magnitude within which a bound is useful."""
 
 
-_kept: dict[object, dict[bytes, Array]] = {}
-"""Drives of the last chain by reference: an emission with the other engine asks for them again."""
-
-_found: dict[object, Measured] = {}
-"""The errors of the last `MOST_KEPT` tables: an emission of another operator or layout asks for them again."""
-
-MOST_KEPT = 64
-"""[models] A rule for the memory of `_found`: their tables take a few megabytes."""
+_kept: dict[object, dict[object, object]] = {}
+"""What was found for the last chain: drives by reference, for an emission with the other engine, and errors by tables,
+for one of another operator or layout."""
 
 
 @dataclass(frozen=True)
@@ -65,17 +64,19 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     codes = compiled.codes
     lsbs = None if codes is None else (codes.drive_lsb, codes.output_lsb)
     about = compiled.seconds, compiled.max_rate, compiled.ahead, lsbs, SAMPLES
-    key = _key(chain, how), _content(compiled.tables), about
-    if key not in _found:
-        while len(_found) >= MOST_KEPT:
-            del _found[next(iter(_found))]
-        _found[key] = _searched(compiled, chain, how)
-    return _found[key]
+    return _once(chain, how, (_content(compiled.tables), about), lambda: _searched(compiled, chain, how))
 
 
-def _key(chain: Chain, how: Compensation) -> object:
-    """All that the drives of the compensator in double precision depend on, besides the references and the range."""
-    return chain.cascade, tuple((type(each), repr(each.model_dump())) for each in chain.effects), how  # keys hold lists
+def _once(chain: Chain, how: Compensation, of: object, make: Callable[[], T]) -> T:
+    """What `make` returns for a chain, kept until another chain is asked for; `of`: all else that it depends on."""
+    effects = tuple((type(each), repr(each.model_dump())) for each in chain.effects)  # their keys may hold lists
+    key = chain.cascade, effects, how
+    if key not in _kept:
+        _kept.clear()
+        _kept[key] = {}
+    if of not in _kept[key]:
+        _kept[key][of] = make()
+    return cast("T", _kept[key][of])
 
 
 def _content(table: object) -> object:
@@ -115,13 +116,7 @@ def _exact(chain: Chain, how: Compensation, references: Run, ends: tuple[float, 
     record = hashlib.sha256(references.t.tobytes() + references.v.tobytes())
     for name, values in sorted(references.extra.items()):
         record.update(name.encode() + values.tobytes())
-    key, reference = (_key(chain, how), ends), record.digest()
-    if key not in _kept:
-        _kept.clear()
-        _kept[key] = {}
-    if reference not in _kept[key]:
-        _kept[key][reference] = Compensator(chain, how).drives(references, ends)
-    return _kept[key][reference]
+    return _once(chain, how, (ends, record.digest()), lambda: Compensator(chain, how).drives(references, ends))
 
 
 def _upward(x: float) -> float:

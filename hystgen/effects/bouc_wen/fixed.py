@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 
-from hystgen.arithmetic.factors import factor, lifted, times
+from hystgen.arithmetic.factors import LARGEST, factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.bouc_wen.compensator import drifted, functions
-from hystgen.effects.bouc_wen.model import ParallelElements
+from hystgen.effects.bouc_wen.model import LARGEST_BALANCE, ParallelElements
 from hystgen.effects.bouc_wen.pieces import CurvePieces, pieces
 from hystgen.effects.plays import (
     Elements,
@@ -43,18 +43,14 @@ DEGREE = 5
 STEEP = (DEGREE - 1).bit_length()
 """Bits of a slope that its computation drops: its terms are up to `DEGREE` times as large as the curve's. Derived."""
 
-SUMMED = 38
-"""Bits of the slope of the sum, by which a distance is multiplied."""
-
-FARTHEST = 2 ** (62 - SUMMED)
-"""[steps] Largest distance over which the sum is computed along its slope, so that the product has 62 bits. Derived."""
+STEEPEST = 2.0 * LARGEST_BALANCE
+"""[1] Largest slope of the curve, right after a turn. Derived."""
 
 ALLOWED = 2.0**-30
 """Error allowed for the curve: about that of a slope with `SLOPE` bits over a quarter of a width."""
 
-WIDTHS = 127
-"""[widths] Largest distance, by the bits of a number to be multiplied; behind 32, the curve is level within `ALLOWED`,
-from any place. Derived."""
+WIDTHS = (LARGEST >> UNIT) - 1
+"""[widths] Largest distance, 127: one more and its places could not be multiplied. Derived."""
 
 
 @functools.cache
@@ -100,7 +96,8 @@ def of(
         [*scale.tolist(), 0], [*lift, 0], strict=True,
     )
     elements = zip(distance, amplitude, weight, far, distance_lift, amplitude_lift, weight_lift, strict=True)
-    most = math.floor(min(straight / step, FARTHEST))
+    steepest = STEEPEST * float(np.abs(weights) @ drive) * step / unit
+    most = math.floor(min(straight / step, 2.0**62 / max(steepest, 1.0)))  # a distance times the slope has 62 bits
     leans, tops = (np.rint(each).astype(np.int64) for each in (np.ldexp(lean / drive, SLOPE), top / step))
     tilt = zip(leans.tolist(), tops.tolist(), (leans << UNIT - SLOPE).tolist(), strict=True) if np.any(lean) else ()
     base = np.rint([weights * widths @ lean / unit]).astype(np.int64)
