@@ -68,7 +68,7 @@ def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | 
     moving = [k for k, record in enumerate(plain) if _moves(record)]
     right = {k: _right_way_round(plain[k], predict) for k in moving}
     if any(one is plain[k] and seen.sense < 0.0 < seen.factor for k, (one, _, seen) in right.items()):
-        right = {k: _as_recorded(plain[k], predict) for k in moving}  # the actuator leads, and the model does not
+        right = {k: _as_recorded(plain[k], predict) for k in moving}  # the actuator leads, as no play sum does
     swapped = {k for k in moving if right[k][0] is not plain[k]}
     findings: list[Finding] = [SwappedChannels(records[k].name) for k in sorted(swapped)]
     kept: list[Record | None] = [

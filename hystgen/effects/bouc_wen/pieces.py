@@ -52,8 +52,8 @@ class CurvePieces(NamedTuple):
 def extremes(
     shape: tuple[float, float], law: tuple[float, float], low: float, high: float
 ) -> tuple[tuple[float, float], float]:
-    """Of an element with a `shape`, width and tilt, whose input stays within a range: -z at the smallest input and z at
-    the largest after a move there from rest at the other end, which no other history exceeds anywhere on the way; and
+    """For an element of a `shape`, its width and tilt, and an input within a range: -z at the smallest input and z at
+    the largest, after a move there from rest at the other end, which no other history exceeds anywhere on the way; and
     the largest change of z per change of the input, right after a reversal."""
     (width, tilt), (exponent, balance) = shape, law
     span = (high - low) / width
