@@ -16,9 +16,10 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What the demo needs from the package; zig, 410 MB, only where no compiler that `verify` looks for makes a library
 comma := ,
-makes_library = $(1) -include stdint.h -shared -fPIC -x c /dev/null -o
 COMPILER = $(shell made=$$(mktemp) && for cc in gcc clang; do \
-    $(call makes_library,$$cc) "$$made" 2>/dev/null && echo $$cc && break; done; rm -f "$$made")
+    $$cc -include stdint.h -shared -fPIC -x c /dev/null -o "$$made" 2>/dev/null && echo $$cc && break; done; \
+    rm -f "$$made")
+
 $(VENV)/demo: pyproject.toml
 	@echo "installing hystgen and what it needs to fit, plot and compile, into $(VENV) .."
 	@test -e $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)

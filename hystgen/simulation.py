@@ -6,17 +6,23 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import FIXED
-from hystgen.basics.problems import EffectsError, RecordError
+from hystgen.basics.problems import EffectsError, RecordError, counted
 from hystgen.chain.chain import join
 from hystgen.compensator import remarks
+from hystgen.compensator.chain.parts import Parts
 from hystgen.model import Answers, Model
 from hystgen.records import Record, in_units
 from hystgen.records.units import quantity
 
 SIGNALS = {"forward": ("v", "y"), "inverse": ("u", "v")}
 """Column that each operator takes, and the one it answers with."""
+
+AT_LIMIT = 0.999
+"""[fraction of a slew limit] A drive at least this fast counts as held back by it. In float32 a drive of 100 V every
+50 us is rounded by 0.15 V/s, 0.05 % of a limit of 333 V/s. Set by: tests/test_simulation.py."""
 
 
 def simulate_records(
@@ -63,6 +69,66 @@ def in_numbers_of(
     if problems:
         raise RecordError(problems)
     return in_units(records, need=(), sources=sources)
+
+
+def units_of(model: Model, operator: str, arithmetic: str | None) -> tuple[str, str]:
+    """Units of the signal that an operator takes and of its answers; fixed point takes and gives codes."""
+    units = model.parameters.units
+    ends = (units.input, units.output) if arithmetic not in FIXED else ("codes", "codes")
+    return ends if operator == "forward" else ends[::-1]
+
+
+def pace(t: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rate of change (N-1,) of a signal from each sample to the next, per second."""
+    return np.asarray(np.diff(x) / np.diff(t), dtype=np.float64)
+
+
+def slew_limits(model: Model) -> list[tuple[float, float]]:
+    """Fastest rise and fastest fall of the drive at the amplifier, input units per second, per slew limit."""
+    return [(each.rate, each.falling_rate) for each in Parts.of(model.effects).slew]
+
+
+def motion(model: Model, record: Record, drives: ArrayLike, arithmetic: str | None) -> tuple[str, list[str]]:
+    """How far and how fast a reference and the inverse's drives (N,) for it move, and a sentence per limit exceeded.
+
+    `record`: the reference, column u, in the model's units. The limits are the slew rate of the model's amplifier and
+    `emit.compensation.max_rate`; those of the ranges are among the remarks of `simulate_records`.
+    """
+    said, v = [f"{record.name}: {_counted(record)}"], np.asarray(drives, dtype=np.float64)
+    reference, drive = units_of(model, "inverse", arithmetic)
+    for what, x, unit in (("reference", record.columns()["u"], reference), ("drive", v, drive)):
+        span = f"{what} {np.min(x):.6g} to {np.max(x):.6g} {unit}".rstrip()
+        fastest = f", at most {np.max(np.abs(pace(record.t, x))):.4g} {unit or 'units'}/s" if len(x) > 1 else ""
+        said.append(span + fastest)
+    return "; ".join(said), [] if arithmetic in FIXED else _of(record.name, _limits(model, pace(record.t, v)))
+
+
+def _counted(record: Record) -> str:
+    """Number of samples of a record, their rate and its length."""
+    if len(record) < 2 or not record.timed:
+        return counted(len(record), "sample")
+    seconds = float(record.t[-1] - record.t[0])
+    return f"{counted(len(record), 'sample')} at {1.0 / record.sample_time:.6g} Hz, {seconds:.6g} s"
+
+
+def _limits(model: Model, rates: NDArray[np.float64]) -> list[str]:
+    """Sentences on drive rates (N-1,) at the slew limit of the amplifier, or beyond that of the error bounds."""
+    unit = model.parameters.units.input or "units"
+    said = []
+    for up, down in slew_limits(model):
+        if number := int(np.count_nonzero(np.maximum(rates / up, -rates / down) > AT_LIMIT)):
+            limit = f"{up:.4g}" if up == down else f"{up:.4g} up and {down:.4g} down"
+            said.append(
+                f"{number} of {len(rates)} moves of the drive are at the amplifier's slew limit, {limit} {unit}/s, and "
+                "the motion falls behind the reference; move more slowly"
+            )
+    bound = model.parameters.emit.compensation.max_rate
+    if bound is not None and (number := int(np.count_nonzero(np.abs(rates) > bound))):
+        said.append(
+            f"{number} of {len(rates)} moves of the drive are faster than emit.compensation.max_rate, {bound:.4g} "
+            f"{unit}/s, up to which the error bounds of the C hold; move more slowly, or raise it"
+        )
+    return said
 
 
 def _simulated(

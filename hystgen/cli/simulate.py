@@ -34,23 +34,33 @@ def _write_record(target: Path, header: list[str], columns: dict[str, NDArray[np
     "--arithmetic", type=click.Choice(list(ARITHMETICS)), help="compute as the emitted C does; default: double"
 )
 @click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the signals, the drive's rate, the loop")
 @common.effects_option
 @common.record_options
 def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
-    effects: tuple[str, ...], history: str | None, rest: float, **reading: Unpack[common.ReadingArguments],
+    plot: str | None, effects: tuple[str, ...], history: str | None, rest: float,
+    **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Run the model (column v) or its inverse (column u) over records; several files form one session.
 
     Example: hystgen simulate stage_x.yaml drive.csv -o predicted.csv --history 100,-100
+
+    For a trajectory: hystgen simulate stage_x.yaml raster.csv --operator inverse -o drive.csv --plot drive.png
+
+    The inverse also takes a position, such as a column "Position [um]", of a file without a drive. It says how fast the
+    reference and the drive move, in units per second, and warns of a drive at the model's limits.
     """
     from hystgen import records, simulation
+    from hystgen.basics import drawing
 
     if len(data) > 1 and output is None:
         raise common.Failed("error: several records need -o with a folder", 2)
     if len({Path(path).stem for path in data}) < len(data):
         raise common.Failed("error: two records have the same name; their results would overwrite each other", 2)
     model = common.load_model(params, effects)
+    if plot:
+        common.guarded(params, partial(drawing.check_path, plot))
     visited = common.history_values(history)
     how = common.reading_options(**reading)
     column, answer = simulation.SIGNALS[operator]
@@ -69,13 +79,17 @@ def simulate(
         raise common.Failed(f"error: {output} is a file, and several records need -o with a folder", 2)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
-    common.keep_inputs(targets, [params, *data])
+    common.keep_inputs([*targets, plot], [params, *data])
     simulated = common.guarded(
         params,
         lambda: simulation.simulate_records(model, converted, operator, arithmetic, engine, visited or (), rest),
     )
-    for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
+    for record, own, target, (answers, remarks) in zip(read, converted, targets, simulated, strict=True):
         columns = record.columns()
+        if operator == "inverse":
+            moves, exceeded = simulation.motion(model, own, answers, arithmetic)
+            console.note(moves)
+            remarks = [*remarks, *exceeded]
         for sentence in remarks:
             console.note(f"warning: {sentence}")
         units = dict(record.units)
@@ -91,3 +105,10 @@ def simulate(
             continue
         common.guarded(str(target), partial(_write_record, target, header, columns))
         console.say(str(target))
+    if plot:
+        from hystgen.report import plots
+
+        found = [answers for answers, _ in simulated]
+        draw = partial(plots.simulation_figure, model, converted, found, operator, arithmetic)
+        common.guarded(params, lambda: drawing.picture(draw, plot))
+        console.note(plot) if output is None else console.say(plot)  # data: standard output holds nothing else

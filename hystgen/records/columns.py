@@ -412,10 +412,14 @@ class Finder:
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
     def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
-        """The only column whose name means `ours`; else, for a time, the first column if its unit is one of time."""
+        """The only column whose name means `ours`; else, for a time, the first column if its unit is one of time, and
+        for a reference a position with nothing beside it but time, since a file with a drive is a recording."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
         meant = [c for c in free if meaning(c) == ours]
+        if not meant and ours == "u":
+            alone = [c for c in self.columns if not (is_time_unit(c.unit) or meaning(c) == "t" or _words(c) & COUNTING)]
+            meant = [c for c in alone if len(alone) == 1 and c in free and meaning(c) == "y"]
         if not meant and ours == "t":
             meant = [c for c in self.columns[:1] if c in free and is_time_unit(c.unit)]
         if len(meant) > 1:

@@ -6,16 +6,26 @@ import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from hystgen import simulation
+from hystgen.arithmetic import FIXED
 from hystgen.basics import drawing
-from hystgen.basics.drawing import label
+from hystgen.basics.drawing import Array, label
 from hystgen.report import fit_figures
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from hystgen.identification import Fit
+    from hystgen.model import Model
     from hystgen.records import Record
     from hystgen.tracking import Tracking
+
+NEAR = 0.1
+"""[fraction of a range] A limit is drawn if the signal comes this near to it: further away, its line would only flatten
+the signal."""
 
 
 def tracking_figure(tracking: Tracking) -> Figure:
@@ -32,6 +42,61 @@ def tracking_figure(tracking: Tracking) -> Figure:
         error.set(xlabel="time (s)", ylabel="tracking error (% of span)")
         drawing.legend_above(error, 3)
     return figure
+
+
+def simulation_figure(
+    model: Model, records: Sequence[Record], answers: Sequence[Array], operator: str, arithmetic: str | None
+) -> Figure:
+    """Per record the signal that the operator takes, its answers (N,), the rate of the drive and, beside the answers,
+    the loop of output over drive.
+
+    `records`: in the operator's units. Lines mark `input_range` and the slew limit where the drive is in those units.
+    """
+    taken, _ = simulation.SIGNALS[operator]
+    forward = operator == "forward"
+    what = ("drive", "output") if forward else ("reference", "drive")
+    units = simulation.units_of(model, operator, arithmetic)
+    colours = (drawing.MODEL, drawing.MEASURED) if forward else (drawing.MEASURED, drawing.MODEL)
+    figure = drawing.figure(12.0, 6.4 * len(records))
+    grid = figure.add_gridspec(3 * len(records), 3)
+    for k, (record, found) in enumerate(zip(records, answers, strict=True)):
+        signals = (record.columns()[taken], np.asarray(found, dtype=np.float64))
+        drive, output = signals if forward else signals[::-1]
+        time = "time (s)" if record.timed else "sample"
+        panels = [figure.add_subplot(grid[3 * k + row, :2]) for row in range(3)]
+        for panel, name, x, unit, colour in zip(panels, what, signals, units, colours, strict=False):
+            at = drawing.kept(0, len(x), x)
+            panel.plot(record.t[at], x[at], color=colour, linewidth=1.0)
+            panel.set(title=name.capitalize(), ylabel=label(name, unit))
+        drive_unit, output_unit = units if forward else units[::-1]
+        rates, middles = simulation.pace(record.t, drive), 0.5 * (record.t[1:] + record.t[:-1])
+        at = drawing.kept(0, len(rates), rates)
+        panels[2].plot(middles[at], rates[at], color=drawing.OTHER, linewidth=1.0)
+        panels[2].set(title="Rate of the drive", xlabel=time, ylabel=label("rate", f"{drive_unit or 'units'}/s"))
+        if arithmetic not in FIXED:
+            _mark(panels[0 if forward else 1], model.cascade.input_range, drive, "input range")
+            for up, down in simulation.slew_limits(model):
+                _mark(panels[2], (-down, up), rates, "slew limit")
+        loop = figure.add_subplot(grid[3 * k : 3 * k + 3, 2])
+        at = drawing.kept(0, len(drive), drive, output)
+        loop.plot(drive[at], output[at], color=drawing.MODEL, linewidth=0.8)
+        which = "Output over drive" if forward else "Reference over drive"
+        loop.set(title=which, xlabel=label("drive", drive_unit), ylabel=label(what[int(forward)], output_unit))
+        if len(records) > 1:
+            panels[0].set_title(f"{record.name}: {what[0]}")
+        figure.align_ylabels(panels)
+    figure.suptitle(f"{model.name}: {operator} operator")
+    return figure
+
+
+def _mark(axes: Axes, ends: tuple[float, float], x: Array, what: str) -> None:
+    """Lines at those of both ends of a range that the signal comes near, with a legend."""
+    span = ends[1] - ends[0]
+    near = [end for end in ends if len(x) and np.min(np.abs(x - end)) < NEAR * span]
+    for k, end in enumerate(near):
+        axes.axhline(end, color=drawing.FAULT, linewidth=1.0, linestyle="--", label=None if k else what)
+    if near:
+        drawing.legend_above(axes, 1)
 
 
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
