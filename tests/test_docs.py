@@ -62,6 +62,7 @@ SHORTER = {"python examples/compensate_plants.py -o docs": " --plant 'Dahl frict
 """Commands that take minutes, and the option that limits each to part of its work here."""
 
 ELSEWHERE = {
+    "python examples/raster.py -o story/": "test_examples.py::test_a_raster_through_the_compiled_c",
     "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
     "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
         "test_session.py::test_the_command_of_the_plan_cuts_the_recording",

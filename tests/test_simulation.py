@@ -87,7 +87,7 @@ def test_moves_at_the_slew_limit_are_counted(
     how = ["--operator", "inverse", "-o", "out.csv", *(["--arithmetic", arithmetic] if arithmetic else [])]
     code, _, err = run("simulate", "limited.yaml", trajectory(up, down), *how)
     assert code == 0
-    found = re.search(r"(\d+) of 2000 moves of the drive are at the amplifier's slew limit, 333 up and 200 down V/s", err)
+    found = re.search(r"(\d+) of 2000 moves of the drive are at the .* limit, 333 up and 200 down V/s", err)
     if not at_limit:
         assert found is None, err
         return

@@ -51,9 +51,7 @@ def reference(low: float, high: float) -> Array:
 def tracked(to_drive: Callable[[float], float], wanted: Array) -> Array:
     """The true motion with a compensator in front of the stage."""
     stage = Stage()
-    first = min(max(to_drive(float(wanted[0])), 0.0), FULL)
-    for _ in range(5000):
-        stage.move(first)
+    stage.rest(min(max(to_drive(float(wanted[0])), 0.0), FULL))
     return np.array([stage.move(min(max(to_drive(float(u)), 0.0), FULL)) for u in wanted])
 
 

@@ -29,28 +29,30 @@ class Stage:
 
     def __init__(self, seed: int = 1) -> None:
         self.noise = np.random.default_rng(seed)
-        self.v = self.bent = 0.0
+        self.v = self.bent = self.h = 0.0
         self.stretch = np.zeros_like(YIELDS)
         self.late = np.zeros(len(DAMPERS))
 
     def move(self, v: float) -> float:
         """The true displacement, um, after the drive has moved to v along a straight line in one sample."""
-        h = 0.0
         for drive in np.linspace(self.v, v, FINE + 1)[1:]:
             bent = drive + BENT * drive * (FULL - drive)
             self.stretch = np.clip(self.stretch + (bent - self.bent), -YIELDS, YIELDS)
             self.bent = bent
-            h = GAIN * bent - float(STIFFNESS @ self.stretch)
+            self.h = GAIN * bent - float(STIFFNESS @ self.stretch)
             for i, (seconds, share) in enumerate(DAMPERS):
-                self.late[i] += (share * h - self.late[i]) * SAMPLE_TIME / FINE / seconds
+                self.late[i] += (share * self.h - self.late[i]) * SAMPLE_TIME / FINE / seconds
         self.v = v
-        return 2.0 + h + float(np.sum(self.late))
+        return 2.0 + self.h + float(np.sum(self.late))
+
+    def rest(self, v: float) -> None:
+        """Move to v and stay there until the dampers have come to rest."""
+        self.move(v)
+        self.late = np.array([share * self.h for _, share in DAMPERS])
 
     def measure(self, drives: Array) -> Array:
         """Sensor readings, sample by sample, after the stage has rested at the first drive."""
-        self.move(float(drives[0]))
-        for _ in range(5000):
-            self.move(float(drives[0]))
+        self.rest(float(drives[0]))
         return np.array([self.move(float(v)) for v in drives]) + NOISE * self.noise.normal(size=len(drives))
 
 
