@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import math
@@ -11,6 +12,7 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -589,6 +591,125 @@ def test_a_file_in_place_of_the_output_folder(output: str) -> None:
     assert everything() == before
 
 
+def test_the_folder_of_the_c_may_be_in_the_parameter_file() -> None:
+    """It is relative to that file; `-o` goes before it; without either it is the current folder."""
+    Path("models").mkdir()
+    into = "emit: {output: ../fw/x}\n"
+    Path("models/x.yaml").write_text(STAGE.replace("name: stage", "name: x") + into)
+    Path("models/y.yaml").write_text(STAGE.replace("name: stage", "name: y") + into)
+    Path("models/z.yaml").write_text(STAGE.replace("name: stage", "name: x") + "emit: {output: z}\n")
+    files = ("models/x.yaml", "models/y.yaml", "models/z.yaml", "stage.yaml")
+    names = {one: [name.replace("stage", one) for name in OUTPUTS] for one in ("x", "y", "stage")}
+    paths = [
+        *(f"fw/x/{name}" for name in names["x"] + names["y"]), *(f"models/z/{name}" for name in names["x"]),
+        *names["stage"],
+    ]
+    assert hyst("emit", *files, "--list-outputs").lines == paths
+    assert hyst("emit", *files).lines == paths
+    assert all(Path(path).is_file() for path in paths)
+    assert hyst("emit", *files, "--check").stdout == ""
+    assert Path("fw/x/x.c").read_bytes() == Path("models/z/x.c").read_bytes(), "the folder changes no byte"
+    with Path("fw/x/y.c").open("a") as file:
+        file.write("int more;\n")
+    Path("models/z/x.h").unlink()
+    said = hyst("emit", *files, "--check", code=1).stderr
+    assert [line for line in said.splitlines() if line.startswith("error: ")] == [
+        "error: fw/x/y.c was edited by hand", "error: models/z/x.h is missing",
+    ]  # fmt: skip
+    (command,) = commands(said)
+    assert command == "hystgen emit models/y.yaml models/z.yaml"
+    run_command(command)
+    hyst("emit", *files, "--check")
+    assert hyst("emit", "models/x.yaml", "-o", "elsewhere").lines == [f"elsewhere/{name}" for name in names["x"]]
+    # A file of one folder is left over there, though its model is given for another
+    Path("models/z.yaml").unlink()
+    said = hyst("emit", *files[:1], "--check", code=1).stderr
+    assert "fw/x/y.c belongs to model y, which is not in any of the given parameter files" in said
+    assert "rm fw/x/y.c fw/x/y.h" in said
+    Path("models/y.yaml").write_text(STAGE.replace("name: stage", "name: X") + into)
+    assert "two models are called x" in hyst("emit", *files[:2], code=2).stderr
+
+
+def test_parameter_files_may_be_a_pattern() -> None:
+    """For callers without a shell, such as pre-commit."""
+    other("second")
+    assert hyst("emit", "s*.yaml", "-o", "fw").lines == [
+        f"fw/{name.replace('stage', one)}" for one in ("second", "stage") for name in OUTPUTS
+    ]
+    hyst("emit", "s*.yaml", "-o", "fw", "--check")
+    assert "t*.yaml: error: cannot be read" in hyst("emit", "t*.yaml", "--check", code=2).stderr
+    assert "t*.yaml: error: cannot be read" in hyst("verify", "t*.yaml", code=2).stderr
+
+
+def test_quiet_prints_what_is_wrong_and_nothing_else() -> None:
+    for arguments in (["-o", "fw"], ["-o", "fw", "--check"]):
+        result = hyst("emit", "stage.yaml", "--quiet", *arguments)
+        assert (result.stdout, result.stderr) == ("", "")
+    Path("fw/stage.c").unlink()
+    assert "fw/stage.c is missing" in hyst("emit", "stage.yaml", "-q", "-o", "fw", "--check", code=1).stderr
+    assert hyst("emit", "stage.yaml", "-q", "--list-outputs").lines == OUTPUTS
+
+
+def cases(path: str = "r.xml") -> dict[str, ElementTree.Element]:
+    """The test cases of a JUnit file by name."""
+    return {case.get("name") or "": case for case in ElementTree.parse(path).getroot().iter("testcase")}
+
+
+def test_check_reports_as_junit() -> None:
+    """A case per file, with its hash; a suite for files that no model writes; sums that agree."""
+    second, how = other("second"), ("-o", "fw", "--check", "--junit", "r.xml")
+    hyst("emit", "stage.yaml", second, "-o", "fw")
+    hyst("emit", "stage.yaml", second, *how)
+    root = ElementTree.parse("r.xml").getroot()
+    assert [root.get(key) for key in ("tests", "failures", "errors")] == ["8", "0", "0"]
+    assert float(root.get("time", "")) > 0.0
+    for name, case in cases().items():
+        digest = hashlib.sha256(Path(name).read_bytes()).hexdigest()
+        assert [(p.get("name"), p.get("value")) for p in case.iter("property")] == [("sha256", digest)]
+    suite = root[0]
+    about = {p.get("name"): p.get("value") for p in suite.findall("properties/property")}
+    parameters = re.search(r"Parameters: sha256 (\w+)", Path("fw/stage.c").read_text())
+    assert parameters
+    assert about == {"hystgen": hystgen.__version__, "sha256 parameters": parameters[1]}
+    Path("fw/stage.c").unlink()
+    said = hyst("emit", "stage.yaml", *how, code=1).stderr
+    failed = {name: case.find("failure") for name, case in cases().items()}
+    assert {name for name, failure in failed.items() if failure is not None} == {
+        "fw/stage.c", *(f"fw/{name.replace('stage', 'second')}" for name in OUTPUTS)
+    }  # fmt: skip
+    assert all(f"error: {failure.get('message')}\n" in said for failure in failed.values() if failure is not None)
+    root = ElementTree.parse("r.xml").getroot()
+    assert [root.get(key) for key in ("tests", "failures", "errors")] == ["8", "5", "0"]
+
+
+def test_junit_is_refused_where_it_cannot_be_written() -> None:
+    hyst("emit", "stage.yaml", "-o", "fw")
+    before = everything()
+    for how, said in (
+        (["--junit", "r.xml"], "add --check"), (["--check", "--junit", "stage.yaml"], "is an input"),
+        (["--check", "--junit", "no/r.xml"], "no/r.xml"),
+    ):  # fmt: skip
+        assert said in hyst("emit", "stage.yaml", "-o", "fw", *how, code=2).stderr
+        assert everything() == before
+    Path("bad.yaml").write_text(BROKEN)
+    hyst("emit", "stage.yaml", "bad.yaml", "-o", "fw", "--check", "--junit", "r.xml", code=2)
+    assert not Path("r.xml").exists(), "nothing was checked"
+
+
+def test_thirty_models_are_checked_in_ten_seconds() -> None:
+    """Half of them with creep and a front; counted in processor time, since other tests run beside this one."""
+    front = "  memoryless: {kind: tanh, ascending: {a0: 6.0, a1: 0.2, a2: 0.0, a3: 0.0}}\n"
+    creep = "  effects: [{name: creep, time_constants: [0.1, 1.0], weights: [0.02, 0.01]}]\n"
+    for k in range(30):
+        text = STAGE.replace("name: stage", f"name: axis_{k}").replace("1.5", f"1.{k}")
+        more = f"{front}{creep}sample_time: 1.0e-4\n" if k % 2 else ""
+        Path(f"axis_{k}.yaml").write_text(f"{text}{more}emit: {{output: fw}}\n")
+    assert len(hyst("emit", "axis_*.yaml").lines) == 30 * len(OUTPUTS)
+    begun = time.process_time()
+    hyst("emit", "axis_*.yaml", "--check")
+    assert time.process_time() - begun < 10.0
+
+
 def test_a_folder_in_place_of_an_output_file_stops_all_of_them() -> None:
     for name in OUTPUTS:
         folder = Path(f"fw_{name}")
@@ -666,6 +787,46 @@ def test_verify_as_a_ci_job_runs_it(installed: str) -> None:
     assert suite.get("failures") == "0"
     assert suite.get("tests") == str(len(rows)) == str(len(suite.findall("testcase")))
     assert not suite.findall(".//failure")
+    assert sum(float(case.get("time", "")) for case in suite.iter("testcase")) == pytest.approx(
+        float(suite.get("time", "")), abs=1e-3 * len(rows)
+    )
+
+
+@pytest.mark.usefixtures("_few")
+def test_verify_reports_version_and_hashes_of_what_emit_writes(installed: str) -> None:
+    """Also where effects are left out, of which the banner has the hash of all parameters."""
+    later = "  effects: [{name: drift, shape: linear, rate: 0.1}]\nsample_time: 1.0e-4\n"
+    Path("part.yaml").write_text(STAGE.replace("name: stage", "name: part") + later)
+    for path, options in (("stage.yaml", ["--layout", "single-header"]), ("part.yaml", ["--allow-partial"])):
+        begun = time.perf_counter()
+        hyst("verify", path, "--compiler", installed, *options, "--junit", "r.xml", "--json", "r.json")
+        took = time.perf_counter() - begun
+        written = hyst("emit", path, "-o", "fw", *options).lines
+        digests = {Path(file).name: hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in written}
+        said = report()
+        assert said["version"] == hystgen.__version__
+        assert said["sha256"].items() >= digests.items()
+        assert f"sha256 {said['sha256']['parameters']}" in Path(written[0]).read_text()
+        suite = ElementTree.parse("r.xml").getroot()
+        about = {p.get("name"): p.get("value") for p in suite.findall("properties/property")}
+        assert about == {
+            "hystgen": hystgen.__version__, **{f"sha256 {name}": value for name, value in said["sha256"].items()}
+        }  # fmt: skip
+        assert 0.0 < float(suite.get("time", "")) < took
+
+
+@pytest.mark.usefixtures("_few")
+def test_verify_quietly_shows_only_models_that_fail(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    second, how = other("second"), ("--compiler", installed, "--quiet")
+    result = hyst("verify", "stage.yaml", second, *how)
+    assert (result.stdout, result.stderr) == ("", "")
+    sabotage(monkeypatch, "inverse", up)
+    monkeypatch.setattr(module, "files", partial(_only_stage, module.files, right=_RIGHT))
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, length=LENGTH))
+    result = hyst("verify", second, "stage.yaml", *how, code=1)
+    assert result.stderr == "verification failed\n"
+    assert "differ" in result.stdout
+    assert "second" not in result.stdout
 
 
 @pytest.mark.usefixtures("_few")

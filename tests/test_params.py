@@ -593,8 +593,14 @@ REFUSED = [
         '5:50: emit.engine: must be auto, corners or loop, not 5; choose one of them',
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
-        '5:83: emit.x: unknown key; valid here: operator, arithmetic, engine, optimize, drive_lsb, output_lsb, '
-        'compensation',
+        '5:83: emit.x: unknown key; valid here: output, operator, arithmetic, engine, optimize, drive_lsb, '
+        'output_lsb, compensation',
+    ]),
+    case('emit_output', H + M + "emit: {output: 3}\n", [
+        '5:16: emit.output: must be text, not 3; put it in quotes',
+    ]),
+    case('emit_output_lines', H + M + 'emit: {output: "a\\nb"}\n', [
+        '5:16: emit.output: must be a single line; remove the line break',
     ]),
     case('compensation', H + M + "emit:\n  compensation: {preview: -1, drive_hold: x, noise_gain: 0, taps: 4, corner: 1.5,"
          " resonance: tuned, quiet: x, still: true}\n", [
@@ -929,6 +935,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
             "effects": draw(st.lists(effect, max_size=3, unique_by=lambda e: e["name"])),
         },
         "emit": {
+            "output": draw(st.none() | st.sampled_from(["firmware", "../a b/c", "/abs: #1"])),
             "operator": draw(st.sampled_from(["inverse", "forward", "both"])),
             "arithmetic": draw(st.sampled_from(["float32", "float64", "q31", "q15"])),
             "engine": draw(st.sampled_from(["auto", "corners", "loop"])),
@@ -1033,6 +1040,13 @@ def test_canonical_json() -> None:
     )
     assert '"optimize":"size"' in canonical_json(parse_parameters(H + M + "emit: {optimize: size}\n"))
     assert parameters_sha256(parse_parameters(H + M)) == "2fbbca7334d59f1230679aa4ffa15effc67782184e067b2ccb5010972c1b339f"
+
+
+def test_hash_ignores_the_folder_of_the_c() -> None:
+    """Moving the C changes no byte of it."""
+    without, there = (parse_parameters(H + M + f"emit: {{engine: loop{more}}}\n") for more in ("", ", output: fw"))
+    assert there.emit.output == "fw"
+    assert parameters_sha256(without) == parameters_sha256(there)
 
 
 def test_hash_ignores_form() -> None:

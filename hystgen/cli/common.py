@@ -106,7 +106,17 @@ def seconds(_context: click.Context, _option: click.Parameter, value: float) -> 
     return value
 
 
+def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """The files that match patterns such as 'held/*.csv', sorted by name; all other paths unchanged."""
+    found: list[str] = []
+    for path in value:
+        found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
+    return tuple(found)
+
+
 params_argument = click.argument("params", type=click.Path())
+several_params_argument = click.argument("params", nargs=-1, required=True, type=click.Path(), callback=matched)
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="print nothing but warnings and errors")
 operator_option = click.option(
     "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
 )
@@ -165,14 +175,6 @@ def number_list(option: str, text: str, example: str) -> list[float]:
     if not all(map(math.isfinite, numbers)):
         raise Failed(f"error: {option} {text!r} is not a list of numbers; write {option} {example}", 2)
     return numbers
-
-
-def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
-    """The files that match patterns such as 'held/*.csv', sorted by name; all other paths unchanged."""
-    found: list[str] = []
-    for path in value:
-        found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
-    return tuple(found)
 
 
 class Judging(click.Command):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import time
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +17,27 @@ from hystgen.basics import console
 from hystgen.cli import common
 
 if TYPE_CHECKING:
+    from hystgen.emission import stale
     from hystgen.model import Model
 
 
+@dataclass(frozen=True)
+class Emitted:
+    """A model with its parameter file, the folder of its C, its C files (name to text) and the s it took to emit."""
+
+    parameters: str
+    model: Model
+    folder: Path
+    files: Mapping[str, str]
+    seconds: float
+
+
 @click.command()
-@click.argument("params", nargs=-1, required=True, type=click.Path())
-@click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
+@common.several_params_argument
+@click.option(
+    "-o", "output", type=click.Path(file_okay=False),
+    help="folder to write to; default: emit.output of each file, else the current folder",
+)
 @common.operator_option
 @common.arithmetic_option
 @common.engine_option
@@ -28,11 +46,14 @@ if TYPE_CHECKING:
 @click.option(
     "--check", is_flag=True, help="write nothing; exit 1 and list the C files that differ or that none of PARAMS writes"
 )
+@click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="with --check: write a JUnit XML report")
+@common.quiet_option
 @common.partial_option
 @common.effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
-    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: object
+    params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
+    list_outputs: bool, quiet: bool, **options: object,
 ) -> None:
     """Write the C files of models.
 
@@ -46,54 +67,96 @@ def emit(
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
+    if junit_file:
+        if not check:
+            raise common.Failed("error: --junit reports what --check finds; add --check", 2)
+        common.keep_inputs([junit_file], params)
+        common.guarded(junit_file, partial(writing.check_writable, junit_file))
     models = common.for_each(params, partial(common.load_model, effects=effects))
-    common.guarded(output, lambda: calls.check_names(models))
-    named = list(zip(params, models, strict=True))
-    texts = common.for_each(named, lambda one: common.guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
-    made = {name: text for each in texts for name, text in each.items()}
+    folders = [_folder(path, model, output) for path, model in zip(params, models, strict=True)]
+    for folder in dict.fromkeys(folders):
+        together = [model for model, own in zip(models, folders, strict=True) if own == folder]
+        common.guarded(str(folder), partial(calls.check_names, together))
+
+    def emitted(one: tuple[str, Model, Path]) -> Emitted:
+        path, model, folder = one
+        begun = time.perf_counter()
+        files = common.guarded(path, lambda: calls.emitted_files(model, **options))
+        return Emitted(path, model, folder, files, time.perf_counter() - begun)
+
+    made = common.for_each(list(zip(params, models, folders, strict=True)), emitted)
     if check:
-        _check(named, texts, output, options, effects)
-    elif list_outputs:
-        for name in made:
-            console.say(str(Path(output) / name))
-    else:
-        for path in common.guarded(output, lambda: writing.write_files(Path(output), made)):
+        _check(made, output, options, effects, junit_file)
+        return
+
+    def written(folder: Path) -> list[Path]:
+        files = {name: text for one in made if one.folder == folder for name, text in one.files.items()}
+        if list_outputs:
+            return [folder / name for name in files]
+        return common.guarded(str(folder), partial(writing.write_files, folder, files))
+
+    for paths in common.for_each(list(dict.fromkeys(folders)), written):
+        for path in paths if list_outputs or not quiet else ():
             console.say(str(path))
 
 
+def _folder(path: str, model: Model, output: str | None) -> Path:
+    """The folder for a model's C: the one on the command line, else the parameter file's, else the current one."""
+    own = model.parameters.emit.output
+    if output is None and own is not None:
+        return Path(os.path.normpath(Path(path).parent / own))
+    return Path(output or ".")
+
+
 def _check(
-    models: Sequence[tuple[str, Model]], texts: Sequence[Mapping[str, str]], output: str, options: Mapping[str, Any],
-    effects: Sequence[str],
+    made: Sequence[Emitted], output: str | None, options: Mapping[str, Any], effects: Sequence[str],
+    junit_file: str | None,
 ) -> None:
     """Exit with code 1 if files on disk are stale; print the differences and the commands that update the files."""
-    from hystgen.emission import calls, stale
-    from hystgen.emission.options import OPTIONS
+    from hystgen.basics import junit, writing
+    from hystgen.emission import stale
+    from hystgen.parameters.files import parameters_sha256
 
-    folder = Path(output)
-    differing = []
-    for (path, model), files in zip(models, texts, strict=True):
-        found = common.guarded(path, partial(stale.find, folder, files))
-        if not found:
-            continue
-        partial_too = {"allow_partial": True} if options["allow_partial"] else {}
-        chosen = calls.emit_options(model, **options)
-        wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
-
-        def again(
-            other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found
-        ) -> list[stale.Difference]:
-            try:
-                with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                    made = calls.emitted_files(model, **other, allow_partial=options["allow_partial"])
-                    return stale.find(folder, made)
-            except ValueError:  # the model no longer exists
-                return list(found)
-
-        differing.append(stale.Stale(path, found, wanted, again))
-    written = {name for files in texts for name in files}
-    unwritten = common.guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
+    differing, unwritten, suites = [], [], []
+    for one in made:
+        found = common.guarded(one.parameters, partial(stale.find, one.folder, one.files))
+        sha256 = parameters_sha256(one.model.parameters)
+        suites.append(
+            stale.suite(one.parameters, one.model.name, one.folder, one.files, found, one.seconds, sha256)
+        )
+        if found:
+            differing.append(_stale(one, found, options))
+    for folder in dict.fromkeys(one.folder for one in made):
+        own = [one for one in made if one.folder == folder]
+        written = {name for one in own for name in one.files}
+        left = common.guarded(str(folder), partial(stale.orphans, folder, written, [one.model.name for one in own]))
+        unwritten += left
+        suites += [stale.orphan_suite(folder, left)] if left else []
+    if junit_file:
+        text = junit.document("hystgen emit --check", suites)
+        common.guarded(junit_file, partial(writing.write_atomically, junit_file, text))
     if differing or unwritten:
         wrong = [*(each for one in differing for each in one.differences), *unwritten]
         problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
+
+
+def _stale(one: Emitted, found: list[stale.Difference], options: Mapping[str, Any]) -> stale.Stale:
+    """A model whose files differ, with the options wanted for it."""
+    from hystgen.emission import calls, stale
+    from hystgen.emission.options import OPTIONS
+
+    partial_too = {"allow_partial": True} if options["allow_partial"] else {}
+    chosen = calls.emit_options(one.model, **options)
+    wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
+
+    def again(other: Mapping[str, str]) -> list[stale.Difference]:
+        try:
+            with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
+                files = calls.emitted_files(one.model, **other, allow_partial=options["allow_partial"])
+                return stale.find(one.folder, files)
+        except ValueError:  # the model no longer exists
+            return list(found)
+
+    return stale.Stale(one.parameters, found, wanted, again)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Compare the emitted C with the reference, bit by bit.")
-@click.argument("params", nargs=-1, required=True, type=click.Path())
+@common.several_params_argument
 @common.operator_option
 @common.arithmetic_option
 @common.engine_option
@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 @click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report as JSON")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
+@common.quiet_option
 def verify(
     params: tuple[str, ...], compiler: tuple[str, ...], targets: str, target_length: int | None, json_file: str | None,
-    junit_file: str | None, effects: tuple[str, ...], **options: object,
+    junit_file: str | None, quiet: bool, effects: tuple[str, ...], **options: object,
 ) -> None:
     """Compile the emitted C of models, run it and compare it with the Python reference, bit for bit.
 
@@ -45,7 +46,10 @@ def verify(
     The exit code is 1 if bits differ or C cannot be built, and 2 if the only problem is a missing tool.
     """
     from hystgen import verification
-    from hystgen.basics import writing
+    from hystgen.basics import jit, writing
+
+    if quiet:
+        jit.announce = None
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -64,7 +68,8 @@ def verify(
         about = f"{path}: " if len(named) > 1 else ""
 
         def say(what: str) -> None:
-            console.note(f"verifying: {about}{what}")
+            if not quiet:
+                console.note(f"verifying: {about}{what}")
 
         check = partial(
             verification.verify, model, compiler=compiler, targets=chosen, target_length=target_length, progress=say
@@ -72,7 +77,9 @@ def verify(
         return replace(common.guarded(path, partial(check, **options)), file=path)
 
     report = verification.Reports(common.for_each(named, verified))
-    console.say(report.table())
+    shown = replace(report, reports=[each for each in report.reports if not each.ok]) if quiet else report
+    if shown.reports:
+        console.say(shown.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
             common.guarded(file, partial(writing.write_atomically, file, text()))

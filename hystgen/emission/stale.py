@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
-import os
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
+from hystgen.basics import junit
 from hystgen.emission.options import read_banner
 
 LINE_ENDS = "has line endings other than LF"
@@ -29,6 +31,31 @@ class Difference:
     def sentence(self) -> str:
         """A sentence on the file and its differences."""
         return f"{self.path} {', '.join(self.reasons)}"
+
+
+def suite(
+    parameters: str, name: str, folder: Path, files: Mapping[str, str], found: Sequence[Difference], seconds: float,
+    sha256: str,
+) -> Element:
+    """A JUnit test suite with a test case per file of a model; the first one took the `seconds` of emitting them.
+
+    `parameters`: the parameter file, whose parameters have the hash `sha256`; `files`: name to text.
+    """
+    reasons = {each.path.name: each.sentence() for each in found}
+    cases = [
+        junit.Case(
+            str(folder / file), 0.0 if k else seconds, reasons.get(file, ""),
+            properties={"sha256": hashlib.sha256(text.encode("ascii")).hexdigest()},
+        )
+        for k, (file, text) in enumerate(files.items())
+    ]
+    return junit.suite(f"hystgen emit --check {name}", parameters, cases, {"sha256 parameters": sha256})
+
+
+def orphan_suite(folder: Path, found: Sequence[Difference]) -> Element:
+    """A JUnit test suite with a failure for each file in a folder that no model writes."""
+    cases = [junit.Case(str(each.path), problem=each.sentence()) for each in found]
+    return junit.suite(f"hystgen emit --check, files left over in {folder}", str(folder), cases, {})
 
 
 def find(folder: Path, files: Mapping[str, str]) -> list[Difference]:
@@ -117,14 +144,14 @@ class Stale:
 
 
 def advice(
-    models: Sequence[Stale], unwritten: Sequence[Difference], folder: str, given: Mapping[str, str | bool],
+    models: Sequence[Stale], unwritten: Sequence[Difference], output: str | None, given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
     """Commands that resolve all differences and orphans, each with its effect.
 
     One command writes everything as asked. For files made with other options, one command per set of options checks
-    them if they are up to date and otherwise rewrites them with these options. `given`: options on the command line;
-    `effects`: files of a user's own effects.
+    them if they are up to date and otherwise rewrites them with these options. `output`: the folder on the command
+    line, None if it is that of the parameter files; `given`: options there; `effects`: files of a user's own effects.
     """
     found = [each for model in models for each in model.differences]
     lost = _lost(found)
@@ -136,17 +163,17 @@ def advice(
         if model.own:
             groups.setdefault((bool(model.again(model.own)), json.dumps(model.own)), []).append(model)
     for (differ, _), group in groups.items():
-        own = command([each.parameters for each in group], folder, {**group[0].own, **group[0].flags}, effects)
+        own = command([each.parameters for each in group], output, {**group[0].own, **group[0].flags}, effects)
         if differ:
             theirs = [each for model in group for each in model.differences]
             said.append(f"to write them again with their own options: {own}{_lost(theirs)}")
         else:
             said.append(f"with their own options they are up to date: {own} --check")
     if models:
-        asked = command([model.parameters for model in models], folder, given, effects)
+        asked = command([model.parameters for model in models], output, given, effects)
         said.append(f"to {'replace them' if groups else 'write them again'}: {asked}{lost}")
     if unwritten:
-        paths = [os.path.join(folder, each.path.name) for each in unwritten]
+        paths = [str(each.path) for each in unwritten]
         foreign = any("in any of" in each.reasons[0] for each in unwritten)
         which = ", or give their parameter files too" if foreign else ""
         said.append(f"to delete what no model writes: {shlex.join(['rm', *paths])}{which}")
@@ -158,10 +185,10 @@ def _lost(found: Sequence[Difference]) -> str:
 
 
 def command(
-    parameters: Sequence[str], folder: str, options: Mapping[str, str | bool], effects: Sequence[str] = ()
+    parameters: Sequence[str], output: str | None, options: Mapping[str, str | bool], effects: Sequence[str] = ()
 ) -> str:
     """The command that emits with these options and files of a user's own effects."""
-    words = ["hystgen", "emit", *parameters, *(["-o", folder] if folder != "." else [])]
+    words = ["hystgen", "emit", *parameters, *(["-o", output] if output not in (None, ".") else [])]
     for key, value in options.items():
         words.append(f"--{key.replace('_', '-')}")
         if isinstance(value, str):

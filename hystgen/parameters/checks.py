@@ -249,8 +249,9 @@ class _Checker:
         name = self.get("name")
         if name is not None and (problem := name_problem(name)):
             self.add(("name",), problem)
-        for path, lines in ((("description",), True), (("units", "input"), False), (("units", "output"), False)):
-            self._text(path, lines)
+        self._text(("description",), lines=True)
+        for path in (("units", "input"), ("units", "output"), ("emit", "output")):
+            self._text(path, lines=False)
         ends = self.get("input_range")
         if ends is not None and not ends[0] < ends[1]:
             self.add(("input_range",), f"{shown(ends[0])} is not below {shown(ends[1])}; write [lowest, highest]")

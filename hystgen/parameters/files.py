@@ -146,11 +146,13 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 def canonical_json(parameters: Parameters) -> str:
     """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density appears as given, not as the plays made from it. Keys added later (`emit.optimize`, `emit.compensation`,
+    A density appears as given, not as the plays made from it. `emit.output` is left out, since the C does not depend on
+    its folder. Keys added later (`emit.optimize`, `emit.compensation`,
     `not_separable` and some in effects) appear only if they differ from the default, so that files without them keep
     their hash.
     """
     data = _data(parameters)
+    del data["emit"]["output"]
     if parameters.emit.optimize == "auto":
         del data["emit"]["optimize"]
     if parameters.emit.compensation == Compensation():

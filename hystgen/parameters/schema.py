@@ -268,6 +268,9 @@ class Compensation(_Part):
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
 
+    output: Annotated[str, Field(max_length=MAX_DESCRIPTION)] | None = Field(
+        default=None, description="folder to write the C to, relative to this file's own", examples=["firmware"]
+    )
     operator: Literal["inverse", "forward", "both"] = Field(default="inverse", description="operator to emit")
     arithmetic: Literal["float32", "float64", "q31", "q15"] = Field(
         default="float32", description="number format of the C"

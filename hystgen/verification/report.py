@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from xml.etree.ElementTree import Element
 
-from hystgen.basics import display
+from hystgen.basics import display, junit
 from hystgen.basics.problems import counted
+from hystgen.basics.version import __version__
 from hystgen.verification.compilers import MissingError
 
 
@@ -22,6 +23,7 @@ class Row:
     else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call used below the
     caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an instance of
     each operator. `note`: a remark on the figures. `missing`: nothing was compared because a tool cannot be used here.
+    `seconds`: time since the row before, which includes building what the row is the first to need.
     """
 
     target: str
@@ -41,11 +43,19 @@ class Row:
     note: str = ""
     error: str = ""
     missing: bool = False
+    seconds: float = 0.0
 
     @property
     def ok(self) -> bool:
         """Whether all bits are equal."""
         return not self.error and not self.different
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """The cost on an emulated core, by name."""
+        keys = ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack")
+        found = {key: getattr(self, key) for key in keys if self.flash is not None}
+        return {key: value for key, value in found.items() if value is not None}
 
     @property
     def _most(self) -> str:
@@ -95,7 +105,8 @@ _RIGHT = {"samples", *(name for name, _ in _WHERE_MEASURED)}
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """All rows of a model's verification; `file`: its parameter file, if known."""
+    """All rows of a model's verification; `file`: its parameter file, if known; `sha256`: of its parameters, as in the
+    banner of the C, and of each file that `emit` would write, by name."""
 
     name: str
     arithmetic: str
@@ -103,6 +114,7 @@ class Report:
     layout: str
     rows: list[Row] = field(default_factory=list)
     file: str = ""
+    sha256: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         wrong = sum(not row.ok for row in self.rows)
@@ -143,39 +155,32 @@ class Report:
         file = {"file": self.file} if self.file else {}
         about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
         rows = [{**asdict(row), "ok": row.ok} for row in self.rows]
-        return {**file, **about, "ok": self.ok, "rows": rows}
+        for row in rows:
+            del row["seconds"]  # the same input gives the same bytes
+        return {**file, **about, "version": __version__, "sha256": dict(self.sha256), "ok": self.ok, "rows": rows}
 
     def to_json(self) -> str:
         """The report for programs."""
         return _json(self.content())
 
-    def suite(self, title: str = "") -> ElementTree.Element:
+    def suite(self, title: str = "") -> Element:
         """A JUnit test suite with one test case per row: a failure if the C is at fault, an error if a tool is
         missing; `title`: used in place of the model's name."""
         title = title or self.name
-        suite = ElementTree.Element(
-            "testsuite", name=f"hystgen verify {title}", tests=str(len(self.rows)),
-            failures=str(sum(not row.ok and not row.missing for row in self.rows)),
-            errors=str(sum(row.missing for row in self.rows)),
-        )
-        for row in self.rows:
-            where = f"{title}.{self.arithmetic}.{self.engine}.{self.layout}"
-            case = ElementTree.SubElement(
-                suite, "testcase", classname=where, name=f"{row.target} {row.compiler} {row.build} {row.operator}"
+        cases = [
+            junit.Case(
+                f"{row.target} {row.compiler} {row.build} {row.operator}", row.seconds,
+                "" if row.ok else row.verdict, row.error, row.missing, row.figures if row.ok else {},
             )
-            if not row.ok:
-                outcome = "error" if row.missing else "failure"
-                ElementTree.SubElement(case, outcome, message=row.verdict).text = row.error or row.verdict
-            elif row.flash is not None:
-                properties = ElementTree.SubElement(case, "properties")
-                keys = ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack")
-                for key in (key for key in keys if getattr(row, key) is not None):
-                    ElementTree.SubElement(properties, "property", name=key, value=str(getattr(row, key)))
-        return suite
+            for row in self.rows
+        ]
+        about = {f"sha256 {name}": digest for name, digest in self.sha256.items()}
+        how = f"{self.arithmetic}.{self.engine}.{self.layout}"
+        return junit.suite(f"hystgen verify {title}", f"{title}.{how}", cases, about)
 
     def to_junit(self) -> str:
         """The report as JUnit XML."""
-        return _xml(self.suite())
+        return junit.document("hystgen verify", [self.suite()])
 
 
 @dataclass(frozen=True)
@@ -220,18 +225,10 @@ class Reports:
 
     def to_junit(self) -> str:
         """The reports as JUnit XML, one suite per model."""
-        if len(self.reports) == 1:
-            return self.reports[0].to_junit()
-        root = ElementTree.Element("testsuites", name="hystgen verify")
-        root.extend(report.suite(title) for title, report in zip(self.titles, self.reports, strict=True))
-        for key in ("tests", "failures", "errors"):
-            root.set(key, str(sum(int(suite.attrib[key]) for suite in root)))
-        return _xml(root)
+        suites = [report.suite(title) for title, report in zip(self.titles, self.reports, strict=True)]
+        return junit.document("hystgen verify", suites)
 
 
 def _json(content: dict[str, object]) -> str:
     return json.dumps({"hystgen": 1, **content}, indent=2) + "\n"
 
-
-def _xml(root: ElementTree.Element) -> str:
-    return ElementTree.tostring(root, encoding="unicode") + "\n"

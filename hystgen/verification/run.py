@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, writing
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_model
 from hystgen.model import ModelSource, as_model
+from hystgen.parameters.files import parameters_sha256
 from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import Expected, expected_records
-from hystgen.verification.report import Report
+from hystgen.verification.report import Report, Row
 from hystgen.verification.targets import AVR, HOST, Board, find
 
 
@@ -55,10 +58,10 @@ def verify(
         arguments.whole("target_length", target_length, "calls", 1)
     model = as_model(source)
     options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial)
+    parameters = parameters_sha256(model.parameters)
     model = emitted_model(model, options)
     numbers = model.tables(options.arithmetic, options.engine, options.operator)
     real = ARITHMETICS[options.arithmetic].number
-    report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
     chosen = [known[name] if name in known else find(name) for name in targets]
 
@@ -68,17 +71,27 @@ def verify(
         return expected_records(numbers, real, op == "inverse", length)
 
     with writing.temporary() as folder:
-        written = sources.write(folder, model, options)
+        written = sources.write(folder, model, options, parameters)
+        sha256 = {"parameters": parameters, **written.sha256}
+        report = Report(model.name, options.arithmetic, options.engine, options.layout, sha256=sha256)
         for target in chosen:
+            begun = time.perf_counter()
             if target is None:
                 wanted = functools.partial(records, length)
-                report.rows.extend(host.rows(written, wanted, real, compiler, folder, progress))
+                report.rows.extend(_timed(begun, host.rows(written, wanted, real, compiler, folder, progress)))
             elif isinstance(target, Board):
                 memory = module.of(model, options).cost.avr
                 size = None if memory is None else avr.Size(model.cascade.pi.n, memory)
-                report.rows.extend(avr.rows(target, written, size, compiler, folder, progress))
+                report.rows.extend(_timed(begun, avr.rows(target, written, size, compiler, folder, progress)))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
-                report.rows.extend(cores.rows(target, written, wanted, compiler, folder, progress))
+                report.rows.extend(_timed(begun, cores.rows(target, written, wanted, compiler, folder, progress)))
     return report
 
+
+def _timed(begun: float, rows: Iterable[Row]) -> Iterator[Row]:
+    """The rows with the time that each took, the first one since `begun`."""
+    for row in rows:
+        now = time.perf_counter()
+        yield replace(row, seconds=now - begun)
+        begun = now

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -19,13 +20,17 @@ from hystgen.plays import slots
 CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
 @dataclass(frozen=True)
 class Sources:
-    """C files by role: the module with its run time, and the files that the verification adds."""
+    """C files by role: the module with its run time, and the files that the verification adds.
+
+    `sha256`: of the files that `emit` writes, by name.
+    """
 
     name: str
     operators: tuple[str, ...]
     module: tuple[Path, ...]
     harness: Path
     selftest: Path | None = None  # code that is not emitted has none
+    sha256: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def emitted(self) -> tuple[Path, ...]:
@@ -72,14 +77,16 @@ def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic
         yield slots.OP_CORRECT, f"{own}_correct(&self, x[i], ({name}_real_t){share})"
 
 
-def write(folder: Path, model: Model, options: Options) -> Sources:
-    """Write the emitted files and the harness into `folder`."""
+def write(folder: Path, model: Model, options: Options, parameters: str = "") -> Sources:
+    """Write the emitted files and the harness into `folder`; `parameters`: hash of those in the file, by default of the
+    model's."""
     name = model.name
-    emitted = module.of(model, options)
+    emitted = module.of(model, options, parameters)
     texts, calls = module.files(emitted), emitted.compensator.calls
+    sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
     texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic])
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, options.operators, tuple(paths.values()), caller, selftest)
+    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256)
