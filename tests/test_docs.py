@@ -7,7 +7,8 @@ and the model `stage_x` identified from them. The language of a fence means:
 - `console`: commands after `$`, with their exact output; `...` stands for any text
 - `python`: code in one namespace per page; a comment after a print gives its output
 - `c`: code that compiles against the emitted `stage_x`
-- `yaml`, `text`: the file that the sentence before it names; `yaml` is all or part of a parameter file that loads
+- `yaml`, `text`: the file that the sentence before it names; `yaml` is all or part of a parameter file that loads, or
+  a hidden file, for a CI system, which tests/test_ci.py runs
 """
 
 from __future__ import annotations
@@ -115,6 +116,7 @@ class Page:
     def run(self, block: Block) -> None:
         """Run or check one block."""
         if block.saved_as:
+            (self.folder / block.saved_as).parent.mkdir(parents=True, exist_ok=True)
             (self.folder / block.saved_as).write_text(block.text)
         getattr(self, block.language)(block)
 
@@ -125,7 +127,7 @@ class Page:
     def yaml(self, block: Block) -> None:
         """Load a parameter file, or the model with a part of a file merged into it."""
         part = YAML(typ="safe", pure=True).load(block.text)
-        if part is None:  # comments for an editor
+        if part is None or (block.saved_as or "").startswith("."):  # comments for an editor; a CI system's file
             return
         whole = part
         if "hystgen" not in part:

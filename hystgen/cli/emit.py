@@ -18,6 +18,7 @@ from hystgen.cli import common
 
 if TYPE_CHECKING:
     from hystgen.emission import stale
+    from hystgen.emission.options import Options
     from hystgen.model import Model
 
 
@@ -114,7 +115,7 @@ def _check(
 ) -> None:
     """Exit with code 1 if files on disk are stale; print the differences and the commands that update the files."""
     from hystgen.basics import junit, writing
-    from hystgen.emission import stale
+    from hystgen.emission import calls, stale
     from hystgen.parameters.files import parameters_sha256
 
     differing, unwritten, suites = [], [], []
@@ -125,7 +126,8 @@ def _check(
             stale.suite(one.parameters, one.model.name, one.folder, one.files, found, one.seconds, sha256)
         )
         if found:
-            differing.append(_stale(one, found, options))
+            chosen = calls.emit_options(one.model, **options)
+            differing.append(_stale(one, found, chosen, options["allow_partial"]))
     for folder in dict.fromkeys(one.folder for one in made):
         own = [one for one in made if one.folder == folder]
         written = {name for one in own for name in one.files}
@@ -142,21 +144,18 @@ def _check(
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
 
 
-def _stale(one: Emitted, found: list[stale.Difference], options: Mapping[str, Any]) -> stale.Stale:
-    """A model whose files differ, with the options wanted for it."""
+def _stale(one: Emitted, found: list[stale.Difference], chosen: Options, allow_partial: bool) -> stale.Stale:
+    """A model whose files differ, with the options chosen for it."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
-
-    partial_too = {"allow_partial": True} if options["allow_partial"] else {}
-    chosen = calls.emit_options(one.model, **options)
-    wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
 
     def again(other: Mapping[str, str]) -> list[stale.Difference]:
         try:
             with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                files = calls.emitted_files(one.model, **other, allow_partial=options["allow_partial"])
+                files = calls.emitted_files(one.model, **other, allow_partial=allow_partial)
                 return stale.find(one.folder, files)
         except ValueError:  # the model no longer exists
             return list(found)
 
+    wanted = {key: getattr(chosen, key) for key in OPTIONS} | ({"allow_partial": True} if allow_partial else {})
     return stale.Stale(one.parameters, found, wanted, again)
