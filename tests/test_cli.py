@@ -881,7 +881,9 @@ def test_several_models_are_verified_in_one_report(installed: str, monkeypatch: 
     files = ("stage.yaml", "linear.yaml", "other/linear.yaml")
     how = ("--compiler", installed, "--json", "r.json", "--junit", "r.xml")
     result = hyst("verify", *files, "stage.yaml", *how)  # one named twice
-    assert result.stdout.count("bits equal") == 6
+    *tables, summary = result.lines
+    assert sum("bits equal" in line for line in tables) == 6
+    assert summary == "bits equal in 3 of 3 models"
     assert [line.split(":")[0] for line in result.stdout.splitlines() if ": " in line] == list(files)
     said = report()
     assert (said["hystgen"], said["ok"], [one["file"] for one in said["reports"]]) == (1, True, list(files))
@@ -895,6 +897,9 @@ def test_several_models_are_verified_in_one_report(installed: str, monkeypatch: 
     monkeypatch.setattr(module, "files", partial(_only_stage, module.files, right=_RIGHT))
     result = hyst("verify", "linear.yaml", "stage.yaml", *how, code=1)
     assert [one["ok"] for one in report()["reports"]] == [True, False]
+    assert result.lines[-1] == "bits equal in 1 of 2 models; wrong in stage"
+    result = hyst("verify", "linear.yaml", "other/linear.yaml", "--compiler", "no-such-cc", code=2)
+    assert result.lines[-1] == "bits equal in 0 of 2 models; could not run all of linear.yaml, other/linear.yaml"
 
 
 _RIGHT = module.files

@@ -80,6 +80,8 @@ def verify(
     shown = replace(report, reports=[each for each in report.reports if not each.ok]) if quiet else report
     if shown.reports:
         console.say(shown.table())
+    if len(report.reports) > 1 and not quiet:
+        console.say(f"\n{report.summary()}")
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
             common.guarded(file, partial(writing.write_atomically, file, text()))

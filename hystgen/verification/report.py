@@ -217,6 +217,16 @@ class Reports:
             for title, report in zip(self.titles, self.reports, strict=True)
         )
 
+    def summary(self) -> str:
+        """A line on all models together."""
+        titled = list(zip(self.titles, self.reports, strict=True))
+        equal = sum(report.ok for report in self.reports)
+        wrong = [title for title, report in titled if report.wrong]
+        unrun = [title for title, report in titled if not report.ok and not report.wrong]
+        said = [f"bits equal in {equal} of {counted(len(self.reports), 'model')}"]
+        said += [f"wrong in {', '.join(wrong)}"] if wrong else []
+        return "; ".join([*said, *([f"could not run all of {', '.join(unrun)}"] if unrun else [])])
+
     def to_json(self) -> str:
         """The reports for programs; several are listed under `reports`."""
         if len(self.reports) == 1:
