@@ -96,6 +96,7 @@ def motion(model: Model, record: Record, drives: ArrayLike, arithmetic: str | No
     """
     said, v = [f"{record.name}: {_counted(record)}"], np.asarray(drives, dtype=np.float64)
     reference, drive = units_of(model, "inverse", arithmetic)
+    reference = reference or record.units.get("u", "")
     for what, x, unit in (("reference", record.columns()["u"], reference), ("drive", v, drive)):
         span = f"{what} {np.min(x):.6g} to {np.max(x):.6g} {unit}".rstrip()
         fastest = f", at most {np.max(np.abs(pace(record.t, x))):.4g} {unit or 'units'}/s" if len(x) > 1 else ""
