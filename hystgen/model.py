@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chained import Compensator
+    from hystgen.compensator.converter import Conversion
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
 
@@ -257,13 +259,29 @@ class Model:
 
     def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:
         """Drive and output units per code in a fixed-point arithmetic. Raises FormatError."""
+        drive, output = self._exact_lsb(arithmetic, engine)
+        return float(drive), float(output)
+
+    def _exact_lsb(self, arithmetic: str, engine: str) -> tuple[Fraction, Fraction]:
         from hystgen.compensator import fixed_tables
 
         codes = self.compiled(arithmetic, engine).codes if self.effects else None
         if codes is not None:
-            return float(codes.drive_lsb), float(codes.output_lsb)
-        drive, output = fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
-        return float(drive), float(output)
+            return codes.drive_lsb, codes.output_lsb
+        return fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
+
+    def conversion(self, arithmetic: str, engine: str = "loop") -> Conversion | None:
+        """Conversions between the codes of `emit.converter` and the emitted C's numbers; None without converters.
+
+        Raises FormatError if the arithmetic is too coarse for them.
+        """
+        from hystgen.compensator import converter
+
+        both = self.parameters.emit.converter
+        if both is None:
+            return None
+        lsb = self._exact_lsb(arithmetic, engine) if arithmetic in FIXED else None
+        return converter.of(both, ARITHMETICS[arithmetic], lsb)
 
     @property
     def _lsb(self) -> tuple[float | None, float | None]:

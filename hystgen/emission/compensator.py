@@ -25,6 +25,7 @@ from hystgen.plays.slots import Reals
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
+    from hystgen.compensator.converter import Conversion
     from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
@@ -436,6 +437,12 @@ class EmittedModel:
         from hystgen.compensator.chain.measured import measured
 
         return measured(self.compiled, self.model.chain, self.model.parameters.emit.compensation)
+
+    @cached_property
+    def conversion(self) -> Conversion | None:
+        """Conversions of converter codes, for an inverse with converters."""
+        options = self.options
+        return self.model.conversion(options.arithmetic, options.engine) if options.inverse else None
 
     @property
     def kernel_facts(self) -> frozenset[str]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
+from hystgen.compensator.converter import Line
 from hystgen.emission import cost, runtime
 from hystgen.emission.compensator import EmittedModel, Macro
 from hystgen.emission.cost import Cost
@@ -189,13 +190,13 @@ def _model(one: EmittedModel) -> str:
     return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
 
 
-def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
-    """The memory that the self-test takes."""
+def selftest_cost(options: Options, found: Cost, samples: int, codes: int) -> list[str]:
+    """The memory that the self-test takes, with this many samples and codes."""
     real = ARITHMETICS[options.arithmetic].bytes
-    constants, instance = cost.selftest_bytes(real, found.memory, samples, cost.CORE_32)
+    constants, instance = cost.selftest_bytes(real, found.memory, samples, codes, cost.CORE_32)
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
     if found.avr is not None:
-        both = sum(cost.selftest_bytes(real, found.avr, samples, cost.AVR))
+        both = sum(cost.selftest_bytes(real, found.avr, samples, codes, cost.AVR))
         lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in total")
     return lines
 
@@ -263,7 +264,29 @@ def limits(one: EmittedModel) -> list[str]:
         if stated and (one.variant.branches or (condition and errors.rounding != errors.inverse)):
             same = f"the same while {together(branch, condition)}"
             found.append((f"INVERSE_ROUNDING_ERROR{suffix}", operand(errors.rounding), same))
-    return _defined(one, found)
+    return _defined(one, [*found, *_codes(one)])
+
+
+def _codes(one: EmittedModel) -> list[Macro]:
+    """Macros about the codes of converters."""
+    conversion, form = one.conversion, one.form
+    if conversion is None:
+        return []
+    found: list[Macro] = []
+    real, converters = one.family.arithmetic.real, one.model.parameters.emit.converter
+    assert converters is not None
+    for side, line, error, unit, quantity in (
+        ("reference", conversion.reference, conversion.reference_error, one.units.output, "output"),
+        ("drive", conversion.drive, conversion.drive_error, one.units.drive, "drive"),
+    ):
+        exact = Line.of(getattr(converters, side))
+        each = f"codes of the {side}'s converter, {float(exact.step):.6g}{f' {unit}' if unit else ''} each"
+        largest = f"of a converted code, {form.counted(quantity, unit)}"
+        found += [
+            (f"{side.upper()}_CODE_MIN", operand(line.least), each), (f"{side.upper()}_CODE_MAX", str(line.most), ""),
+            (f"{side.upper()}_CODE_ERROR{form.suffix}", literal(real(error)), largest),
+        ]
+    return found
 
 
 def _timing(one: EmittedModel) -> list[Macro]:
@@ -342,15 +365,23 @@ CALLS = {
     "correct": CallFacts(
         "after a step, when the sensor's value belongs to the drive that was applied before that step", _FEW, _SET
     ),
+    "reference_from_code": CallFacts("at any time", _FEW),
+    "drive_from_code": CallFacts("at any time", _FEW),
+    "code_from_drive": CallFacts("at any time", _FEW),
+    "step_code": CallFacts(
+        "after init; once every sample time, from one context, in place of step and commit",
+        "that of a step, of commit and of three conversions",
+        ("INPUT_CLAMPED", "OUTPUT_CLAMPED", "DOMAIN", "SLEW_LIMITED"),
+    ),
 }
 """The calls of the interface."""
 
-_PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
+_PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_((?P<op>forward|inverse)_)?(?P<call>\w+)\((?P<given>[^)]*)\);")
 
 
-def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterator[Piece]:
+def documented(one: EmittedModel, cost: Cost) -> Iterator[Piece]:
     """Prototypes of a model's interface, each below its documentation."""
-    for piece in pieces:
+    for piece in runtime.prototypes_of(one.variant, one.options.operators, one.calls):
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
         brief = piece.text.partition("/*")[2].partition("*/")[0]
@@ -400,11 +431,18 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         "d": _unit("output", one),
         "measured": _unit("output", one),
         "travel": "total distance that the drive has moved, in units of the drive",
+        "code": f"code of the converter, {macros}_{'DRIVE' if call == 'drive_from_code' else 'REFERENCE'}_CODE_MIN .. "
+        "MAX, beyond which it is limited; codes in two's complement have their sign extended to 32 bits",
+        "drive": _unit("drive", one) + "; NaN gives the lowest code" * bool(held),
     }[name]
-    return what + held
+    return what + held * (name not in ("code", "drive"))
 
 
-def _answer(call: str, op: str, one: EmittedModel) -> str:
+def _answer(call: str, op: str | None, one: EmittedModel) -> str:
+    if call in ("step_code", "code_from_drive"):
+        return f"code of the drive's converter, {one.names.NAME}_DRIVE_CODE_MIN .. MAX"
+    if call in ("reference_from_code", "drive_from_code"):
+        return _unit(call.partition("_")[0], one)
     if call == "status":
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "travel":
@@ -412,7 +450,7 @@ def _answer(call: str, op: str, one: EmittedModel) -> str:
     return _unit("drive" if op == "inverse" and call == "step" else "output", one)
 
 
-def _bits(call: str, op: str, one: EmittedModel) -> str:
+def _bits(call: str, op: str | None, one: EmittedModel) -> str:
     if call == "reset":
         return "cleared, then those of the step"
     if call == "status":
@@ -427,8 +465,8 @@ def _bits(call: str, op: str, one: EmittedModel) -> str:
     return ", ".join(found) or "none"
 
 
-def _cost(call: str, op: str, one: EmittedModel, cost: Cost) -> str:
-    if call == "step":
+def _cost(call: str, op: str | None, one: EmittedModel, cost: Cost) -> str:
+    if op and call == "step":
         return f"at most {dict(cost.worst_case)[op]}"
     if call == "commit" and one.corners and not one.variant.chain:
         return "at most that of a step"

@@ -16,7 +16,7 @@ from hystgen.emission.cost import Cost, Data
 from hystgen.emission.folding import PLAIN, Members
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
-from hystgen.emission.text import define, fit
+from hystgen.emission.text import define, fit, operand
 from hystgen.parameters.files import parameters_sha256
 from hystgen.plays import slots
 
@@ -44,7 +44,8 @@ def compensator(model: Model, options: Options) -> EmittedModel:
         numbers = form.chained(model, compiled, effects, behind, options, writer)
     else:
         numbers = form.numbers(model, options, writer)
-    variant = _variant(options, family, model.cascade, numbers, compiled)
+    coded = options.inverse and model.parameters.emit.converter is not None
+    variant = dataclasses.replace(_variant(options, family, model.cascade, numbers, compiled), coded=coded)
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
     elif loop:
@@ -101,6 +102,7 @@ def front(one: EmittedModel) -> str:
 def composed(one: EmittedModel) -> Code:
     """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
     family, names, operators, numbers = one.family, one.names, one.options.operators, one.numbers
+    conversions = [(name, operand(value), "") for name, value in one.conversion.macros] if one.conversion else []
     shared = one.options.layout == "shared-runtime"
     blocks: list[runtime.Piece] = []
     given, given_functions = list[runtime.Piece](), list[runtime.Piece]()
@@ -151,7 +153,7 @@ def composed(one: EmittedModel) -> Code:
         operators=text,
         macros=tuple(
             define(f"{names.NAME}_{name}", value, comment)
-            for name, value, comment in numbers.macros if f"{names.NAME}_{name}" in text
+            for name, value, comment in (*numbers.macros, *conversions) if f"{names.NAME}_{name}" in text
         ),
         plays=tuple(plays),
         beside=tuple(beside),
@@ -243,10 +245,7 @@ def files(module: Module) -> dict[str, str]:
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,
             banner=top(f"{name}.h", f"{WHAT[options.operator]} of {name}", details),
             build=runtime.verbatim(family.build, name, family, name),
-            api=runtime.api(
-                options.operators, name, one.names.rt, family, one.calls,
-                lambda pieces: interface.documented(pieces, one, module.cost),
-            ),
+            api=runtime.api(interface.documented(one, module.cost), name, one.names.rt, family),
             implementation=whole if single else "",
         )
     }
@@ -257,13 +256,14 @@ def files(module: Module) -> dict[str, str]:
     if shared:
         found |= runtime_files(options.arithmetic)
     operators = selftest.operators(one)
-    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators))
+    codes = selftest.codes(one)
+    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators), len(codes))
     for ending, about, more in (
         (".h", f"checks {name} on the target", costs),
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        text = template(f"selftest{ending}.j2", operators=operators, unread=slots.OP_UNREAD)
+        text = template(f"selftest{ending}.j2", operators=operators, codes=codes, unread=slots.OP_UNREAD)
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}

@@ -43,6 +43,9 @@ _PARTS: dict[str, type[BaseModel]] = {
     "descending": schema.TanhBranch,
     "emit": schema.EmitDefaults,
     "compensation": schema.Compensation,
+    "converter": schema.Converters,
+    "reference": schema.Converter,
+    "drive": schema.Converter,
 }
 
 _PLACES: dict[str, type[BaseModel]] = {
@@ -69,6 +72,11 @@ _WRITTEN = {
     "p": "p: [0.8, 0.2, 0.1]",
     "p0": "p0: 0.7",
     "r_max": "r_max: 10",
+    "reference": "reference: {bits: 16, range: [0, 20], coding: offset-binary}",
+    "drive": "drive: {bits: 16, range: [-10, 110], coding: offset-binary}",
+    "bits": "bits: 16",
+    "range": "range: [-10, 110]",
+    "coding": "coding: offset-binary` or `coding: twos-complement",
 }
 
 
@@ -254,6 +262,8 @@ class _Checker:
         ends = self.get("input_range")
         if ends is not None and not ends[0] < ends[1]:
             self.add(("input_range",), f"{shown(ends[0])} is not below {shown(ends[1])}; write [lowest, highest]")
+        for side in ("reference", "drive"):
+            self._converter(("emit", "converter", side), ends if side == "drive" else None)
         if isinstance(self.at(("model", "pi")), Mapping):
             self._pi(("model", "pi"))
         stages = self.at(("model", "memoryless"))
@@ -265,6 +275,21 @@ class _Checker:
         if isinstance(listed := self.at(("model", "effects")), tuple):
             for i, effect in enumerate(listed[: schema.MAX_EFFECTS]):
                 self._effect(("model", "effects", i), effect)
+
+    def _converter(self, path: Path, needed: tuple[float, float] | None) -> None:
+        """A converter, whose codes reach every quantity in the range `needed`."""
+        ends = self.get(*path, "range")
+        if ends is None:
+            return
+        low, high = min(ends), max(ends)
+        if low == high:
+            self.add((*path, "range"), "both ends are the same; write the quantities at the lowest and highest code")
+        elif needed is not None and not (low <= needed[0] and needed[1] <= high):
+            self.add(
+                (*path, "range"),
+                f"reaches {shown(low)} .. {shown(high)}, but input_range is {shown(needed[0])} .. {shown(needed[1])}; "
+                "correct the range, or narrow input_range to what the converter reaches",
+            )
 
     def _text(self, path: Path, lines: bool) -> None:
         text = self.get(*path) or ""
