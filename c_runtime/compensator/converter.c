@@ -1,4 +1,4 @@
-/* Codes of converters: a quantity is a straight line over its converter's codes. Called by users. */
+/* Codes of converters, over which a quantity is a straight line. Called by users. */
 #ifndef HYSTGEN_CONVERTER_C
 #define HYSTGEN_CONVERTER_C
 #include "compensator/model.h"
@@ -34,8 +34,8 @@ hystgen_real_t hystgen_drive_from_code(int32_t code) {
 }
 
 int32_t hystgen_code_from_drive(hystgen_real_t drive) {
-    const int64_t code = hystgen_nearest(
-        HYSTGEN_CODE_AT_ZERO + (int64_t)drive * HYSTGEN_CODE_STEP, HYSTGEN_CODE_STEP_BITS);
+    const int64_t code = hystgen_nearest(HYSTGEN_CODE_AT_ZERO + (int64_t)drive * HYSTGEN_CODE_STEP,
+                                         HYSTGEN_CODE_STEP_BITS);
     if (code < HYSTGEN_DRIVE_CODE_MIN) {
         return HYSTGEN_DRIVE_CODE_MIN;
     }

@@ -88,6 +88,20 @@ def reading(one: EmittedModel) -> list[str]:
     return [*_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
 
 
+def unreached(one: EmittedModel) -> list[str]:
+    """A sentence if the codes of the reference's converter do not reach the whole range of references."""
+    both, unit = one.model.parameters.emit.converter, one.units.output
+    if one.conversion is None or both is None:
+        return []
+    lsb = float(one.numbers.lsb[1]) if one.numbers.lsb else 1.0
+    low, high = (lsb * float(end) for end in one.numbers.tables.limits.output[0])
+    least, most = sorted(both.reference.range)
+    if least <= low and high <= most:
+        return []
+    reached, needed = (f"{a:.5g} .. {b:.5g} {unit}".rstrip() for a, b in ((least, most), (low, high)))
+    return [f"Converter: codes of references reach {reached}, and the model's range is {needed}"]
+
+
 def _averaged(compiled: Compiled) -> list[str]:
     """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and their
     drawbacks."""

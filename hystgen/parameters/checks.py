@@ -281,7 +281,7 @@ class _Checker:
         ends = self.get(*path, "range")
         if ends is None:
             return
-        low, high = min(ends), max(ends)
+        low, high = float(min(ends)), float(max(ends))
         if low == high:
             self.add((*path, "range"), "both ends are the same; write the quantities at the lowest and highest code")
         elif needed is not None and not (low <= needed[0] and needed[1] <= high):
@@ -557,7 +557,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         wrong, advice = "must be a stage or a list of stages", _KINDS
     if kind == "finite_number" or (kind == "float_type" and type(value) is int):
         return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in magnitude"
-    if key == "input_range" and kind in ("too_long", "tuple_type"):
+    if key in ("input_range", "range") and kind in ("too_long", "tuple_type"):
         return _TWO_NUMBERS
     if wrong:
         return f"{wrong}, not {shown(value)}; {advice}"
@@ -566,7 +566,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if kind == "literal_error" and not key:  # in a list
         return _choice(value, re.findall(r"'([^']*)'", context["expected"]))
     if kind == "literal_error":
-        fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
+        parts = (schema.EmitDefaults, schema.Compensation, schema.Converter)
+        fields = {name: field for part in parts for name, field in part.model_fields.items()}
         return _choice(value, get_args(fields[key].annotation) if key != "kind" else schema.STAGE_KINDS)
     if kind in _BOUNDS:
         limit, what = _BOUNDS[kind]
