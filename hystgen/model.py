@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chained import Compensator
-    from hystgen.compensator.converter import Conversion
+    from hystgen.compensator.converter import CodeConversion
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
 
@@ -256,9 +256,9 @@ class Model:
         assert seconds is not None, "need_compensated asks for it"
         emit, (drive, output) = self.parameters.emit, self._lsb
         if drive is None and emit.converter and emit.compensation.quiet and arithmetic not in FIXED:
-            from hystgen.compensator.converter import Line
+            from hystgen.compensator.converter import CodeLine
 
-            drive = float(abs(Line.of(emit.converter.drive).step))
+            drive = float(abs(CodeLine.of(emit.converter.drive).step))
         return chain_tables.build(self.chain, arithmetic, seconds, emit.compensation, (drive, output), engine)
 
     def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:
@@ -274,7 +274,7 @@ class Model:
             return codes.drive_lsb, codes.output_lsb
         return fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
 
-    def conversion(self, arithmetic: str, engine: str = "loop") -> Conversion | None:
+    def conversion(self, arithmetic: str, engine: str = "loop") -> CodeConversion | None:
         """Conversions between the codes of `emit.converter` and the emitted C's numbers; None without converters.
 
         Raises FormatError if the arithmetic is too coarse for them, or the drive's converter for a slew limit.
@@ -285,7 +285,7 @@ class Model:
         if both is None:
             return None
         if self.effects and seconds:
-            self._check_slew(float(abs(converter.Line.of(both.drive).step)), seconds)
+            self._check_slew(float(abs(converter.CodeLine.of(both.drive).step)), seconds)
         lsb = self._exact_lsb(arithmetic, engine) if arithmetic in FIXED else None
         return converter.of(both, ARITHMETICS[arithmetic], lsb)
 

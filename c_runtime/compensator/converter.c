@@ -3,7 +3,6 @@
 #define HYSTGEN_CONVERTER_C
 #include "compensator/model.h"
 #include "compensator/clamp.c"
-#include "compensator/converter.h"
 
 /* The nearest of a converter's codes. */
 static int32_t hystgen_nearest_code(int32_t code, int32_t least, int32_t most) {

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hystgen.arithmetic import Arithmetic
 from hystgen.basics.problems import FormatError
 from hystgen.compensator.fixed_tables import decimal
-from hystgen.plays.slots import OP_COMMIT, OP_STEP, OP_UNREAD
+from hystgen.plays.slots import OP_COMMIT, OP_STEP, OP_UNREAD, Bytes
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
@@ -22,13 +22,14 @@ if TYPE_CHECKING:
     from hystgen.parameters.schema import Converter, Converters
 
 Codes: TypeAlias = NDArray[np.int64]
+Numbers: TypeAlias = NDArray[np.number]
 
 SUM_BITS = 62
 """[bits] A sum in fixed point stays below 2^62 in magnitude, so that half a unit can be added in 64 bits."""
 
 
 @dataclass(frozen=True)
-class Line:
+class CodeLine:
     """A quantity over its converter's codes `least` .. `most`: `zero` at code 0, and `step` more at the next one."""
 
     least: int
@@ -37,7 +38,7 @@ class Line:
     step: Fraction
 
     @classmethod
-    def of(cls, one: Converter) -> Line:
+    def of(cls, one: Converter) -> CodeLine:
         """The line of a converter, exact."""
         codes = 1 << one.bits
         least = -codes // 2 if one.coding == "twos-complement" else 0
@@ -46,7 +47,7 @@ class Line:
         step = (high - low) / (most - least)
         return cls(least, most, low - least * step, step)
 
-    def inside(self, codes: NDArray[Any]) -> Codes:
+    def inside(self, codes: Numbers) -> Codes:
         """The nearest of the converter's codes."""
         return np.clip(np.asarray(codes, dtype=np.int64), self.least, self.most)
 
@@ -56,7 +57,7 @@ class Line:
         return max(abs(self.zero + code * self.step) for code in (self.least, self.most))
 
 
-class Conversion(ABC):
+class CodeConversion(ABC):
     """The conversions of a model in an arithmetic.
 
     `reference`, `drive`: exact lines in the model's numbers, which are physical units or codes of the model;
@@ -64,36 +65,36 @@ class Conversion(ABC):
     distance of a drive from the drive of its code, in converter steps: half a step and rounding.
     """
 
-    reference: Line
-    drive: Line
+    reference: CodeLine
+    drive: CodeLine
     reference_error: float
     drive_error: float
     code_error: float
 
     @abstractmethod
-    def reference_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def reference_from_code(self, codes: Numbers) -> Numbers:
         """References (N,) of codes (N,)."""
 
     @abstractmethod
-    def drive_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def drive_from_code(self, codes: Numbers) -> Numbers:
         """Drives (N,) of codes (N,)."""
 
     @abstractmethod
-    def code_from_drive(self, drives: NDArray[Any]) -> Codes:
+    def code_from_drive(self, drives: Numbers) -> Codes:
         """Codes (N,) whose drives are nearest to the drives (N,)."""
 
     @property
     @abstractmethod
-    def macros(self) -> tuple[tuple[str, Any], ...]:
+    def macros(self) -> tuple[tuple[str, int | np.floating], ...]:
         """Names, without the model's prefix, and values of the constants in the C."""
 
 
-class FloatConversion(Conversion):
+class FloatConversion(CodeConversion):
     """In floating point: a product and a sum. Raises FormatError if a drive from one code can come back as another."""
 
     def __init__(self, both: Converters, arithmetic: Arithmetic) -> None:
         self.real = real = arithmetic.real
-        self.reference, self.drive = Line.of(both.reference), Line.of(both.drive)
+        self.reference, self.drive = CodeLine.of(both.reference), CodeLine.of(both.drive)
         self.reference_error, self.drive_error = self._error(self.reference), self._error(self.drive)
         self._numbers = {
             side: (real(float(line.zero)), real(float(line.step)))
@@ -114,23 +115,23 @@ class FloatConversion(Conversion):
             )
             raise FormatError((("emit", "converter", "drive", "bits"), words))
 
-    def _error(self, line: Line) -> float:
+    def _error(self, line: CodeLine) -> float:
         """Rounding of the zero, the step, their product and their sum."""
         unit, most = float(np.finfo(self.real).eps) / 2, max(abs(line.least), abs(line.most))
         return unit * float(abs(line.zero) + 2 * most * abs(line.step) + line.largest) * (1 + 4 * unit)
 
-    def _quantity(self, side: str, codes: Codes) -> NDArray[Any]:
+    def _quantity(self, side: str, codes: Codes) -> Numbers:
         zero, step = self._numbers[side]
-        found: NDArray[Any] = zero + codes.astype(self.real) * step
+        found: Numbers = zero + codes.astype(self.real) * step
         return found
 
-    def reference_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def reference_from_code(self, codes: Numbers) -> Numbers:
         return self._quantity("reference", self.reference.inside(codes))
 
-    def drive_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def drive_from_code(self, codes: Numbers) -> Numbers:
         return self._quantity("drive", self.drive.inside(codes))
 
-    def code_from_drive(self, drives: NDArray[Any]) -> Codes:
+    def code_from_drive(self, drives: Numbers) -> Codes:
         line = self.drive
         with np.errstate(over="ignore", invalid="ignore"):
             found = (np.asarray(drives, dtype=self.real) - self._numbers["drive"][0]) * self._codes
@@ -142,7 +143,7 @@ class FloatConversion(Conversion):
         return nearest
 
     @property
-    def macros(self) -> tuple[tuple[str, Any], ...]:
+    def macros(self) -> tuple[tuple[str, int | np.floating], ...]:
         (zero, step), (drive_zero, drive_step) = self._numbers["reference"], self._numbers["drive"]
         return (
             ("REFERENCE_AT_ZERO", zero), ("REFERENCE_STEP", step),
@@ -174,14 +175,14 @@ class Scaled:
         return 0.5 + (most + 1) / 2.0 ** (self.bits + 1)
 
 
-class FixedConversion(Conversion):
+class FixedConversion(CodeConversion):
     """In fixed point. `drive_lsb`, `output_lsb`: physical units per code of the model; `code_max`: its largest code."""
 
     def __init__(self, both: Converters, lsb: tuple[Fraction, Fraction], code_max: int) -> None:
         (drive_lsb, output_lsb), self._code_max = lsb, code_max
         self.reference, self.drive = (
-            Line(line.least, line.most, line.zero / unit, line.step / unit)
-            for line, unit in ((Line.of(both.reference), output_lsb), (Line.of(both.drive), drive_lsb))
+            CodeLine(line.least, line.most, line.zero / unit, line.step / unit)
+            for line, unit in ((CodeLine.of(both.reference), output_lsb), (CodeLine.of(both.drive), drive_lsb))
         )
         self._scaled = [
             Scaled.of(line.zero, line.step, max(abs(line.least), abs(line.most)))
@@ -197,17 +198,17 @@ class FixedConversion(Conversion):
     def _limited(self, codes: Codes) -> Codes:
         return np.clip(codes, -self._code_max, self._code_max)
 
-    def reference_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def reference_from_code(self, codes: Numbers) -> Numbers:
         return self._limited(self._scaled[0].at(self.reference.inside(codes)))
 
-    def drive_from_code(self, codes: NDArray[Any]) -> NDArray[Any]:
+    def drive_from_code(self, codes: Numbers) -> Numbers:
         return self._limited(self._scaled[1].at(self.drive.inside(codes)))
 
-    def code_from_drive(self, drives: NDArray[Any]) -> Codes:
+    def code_from_drive(self, drives: Numbers) -> Codes:
         return self.drive.inside(self._code.at(np.asarray(drives, dtype=np.int64)))
 
     @property
-    def macros(self) -> tuple[tuple[str, Any], ...]:
+    def macros(self) -> tuple[tuple[str, int | np.floating], ...]:
         reference, drive = self._scaled
         return (
             ("REFERENCE_AT_ZERO", reference.zero), ("REFERENCE_STEP", reference.step),
@@ -217,7 +218,7 @@ class FixedConversion(Conversion):
         )
 
 
-def of(both: Converters, arithmetic: Arithmetic, lsb: tuple[Fraction, Fraction] | None) -> Conversion:
+def of(both: Converters, arithmetic: Arithmetic, lsb: tuple[Fraction, Fraction] | None) -> CodeConversion:
     """The conversions in an arithmetic; `lsb`: drive and output units per code of the model, None without codes.
 
     Raises FormatError.
@@ -228,8 +229,8 @@ def of(both: Converters, arithmetic: Arithmetic, lsb: tuple[Fraction, Fraction] 
 
 
 def steps(
-    t: Tables | FixedTables | ChainTables, conversion: Conversion, codes: NDArray[Any], compiled: bool = True
-) -> tuple[Codes, NDArray[np.uint8]]:
+    t: Tables | FixedTables | ChainTables, conversion: CodeConversion, codes: Numbers, compiled: bool = True
+) -> tuple[Codes, Bytes]:
     """Codes of drives (N,) and status bits (N,) of an inverse for codes of references (N,), from its start memory."""
     from hystgen.basics import jit
     from hystgen.compensator import reference

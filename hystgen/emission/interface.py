@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
-from hystgen.compensator.converter import Line
+from hystgen.compensator.converter import CodeLine
 from hystgen.emission import cost, runtime
 from hystgen.emission.compensator import EmittedModel, Macro
 from hystgen.emission.cost import Cost
@@ -293,7 +293,7 @@ def _codes(one: EmittedModel) -> list[Macro]:
         ("reference", conversion.reference, conversion.reference_error, one.units.output, "output"),
         ("drive", conversion.drive, conversion.drive_error, one.units.drive, "drive"),
     ):
-        exact = Line.of(getattr(converters, side))
+        exact = CodeLine.of(getattr(converters, side))
         each = f"codes of the {side}'s converter, {float(exact.step):.6g}{f' {unit}' if unit else ''} each"
         largest = f"of a converted code, {form.counted(quantity, unit)}"
         found += [

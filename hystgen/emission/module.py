@@ -44,13 +44,17 @@ def compensator(model: Model, options: Options) -> EmittedModel:
         numbers = form.chained(model, compiled, effects, behind, options, writer)
     else:
         numbers = form.numbers(model, options, writer)
-    coded = options.inverse and model.parameters.emit.converter is not None
-    variant = dataclasses.replace(_variant(options, family, model.cascade, numbers, compiled), coded=coded)
+    variant = _variant(options, family, model.cascade, numbers, compiled)
+    conversion = model.conversion(options.arithmetic, options.engine) if options.inverse else None
+    if conversion:
+        variant = dataclasses.replace(variant, coded=True)
+        macros = ((name, operand(value), "") for name, value in conversion.macros)
+        numbers = dataclasses.replace(numbers, macros=(*numbers.macros, *macros))
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
     elif loop:
         glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
-    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue)
+    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue, conversion)
 
 
 def _variant(
@@ -102,7 +106,6 @@ def front(one: EmittedModel) -> str:
 def composed(one: EmittedModel) -> Code:
     """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
     family, names, operators, numbers = one.family, one.names, one.options.operators, one.numbers
-    conversions = [(name, operand(value), "") for name, value in one.conversion.macros] if one.conversion else []
     shared = one.options.layout == "shared-runtime"
     blocks: list[runtime.Piece] = []
     given, given_functions = list[runtime.Piece](), list[runtime.Piece]()
@@ -153,7 +156,7 @@ def composed(one: EmittedModel) -> Code:
         operators=text,
         macros=tuple(
             define(f"{names.NAME}_{name}", value, comment)
-            for name, value, comment in (*numbers.macros, *conversions) if f"{names.NAME}_{name}" in text
+            for name, value, comment in numbers.macros if f"{names.NAME}_{name}" in text
         ),
         plays=tuple(plays),
         beside=tuple(beside),

@@ -73,6 +73,11 @@ FIXED_KERNELS = (
 
 APART = "HYSTGEN_APART "
 
+CODED = (
+    "hystgen_reference_from_code", "hystgen_drive_from_code", "hystgen_code_from_drive", "hystgen_inverse_step_code",
+)
+"""Calls of an inverse with converters."""
+
 
 @dataclass(frozen=True)
 class Family(ABC):
@@ -612,14 +617,15 @@ def piece_of(text: str) -> Piece:
 
 def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
     """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
-    coded = _pieces(["compensator/converter.h"], ()) if variant.coded else []
+    coded = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name in CODED] if variant.coded else []
     return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *coded]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     """Prototypes of an operator: those of every model, and those named in `more` of models with effects."""
     prefix = f"hystgen_{operator}_"
-    usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
+    every = _pieces(["compensator/api.h"], ())
+    usual = [piece for piece in every if piece.name.startswith(prefix) and piece.name not in CODED]
     chain = {prefix + each for each in more}
     return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import converter, reference
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.converter import Conversion
+from hystgen.compensator.converter import CodeConversion
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
@@ -68,11 +67,11 @@ class ExpectedCodes:
     """Codes of converters, and the reference's results for them by name: conversions, codes sent, status bits."""
 
     codes: NDArray[np.int32]
-    results: Mapping[str, NDArray[Any]]
+    results: Mapping[str, NDArray[np.number]]
 
 
 def expected_codes(
-    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], conversion: Conversion, length: int
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], conversion: CodeConversion, length: int
 ) -> ExpectedCodes:
     """Codes for both converters, some beyond their ends, with the results of the bit-exact reference."""
     codes = signals.codes(conversion, length)
@@ -87,7 +86,7 @@ def expected_codes(
 
 
 def compare_codes(
-    run: Callable[[NDArray[np.int32]], Sequence[NDArray[Any]]], expected: ExpectedCodes
+    run: Callable[[NDArray[np.int32]], Sequence[NDArray[np.number]]], expected: ExpectedCodes
 ) -> Mismatch:
     """Compare the compiled results for codes, bit for bit."""
     different = 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import cffi
 import numpy as np
@@ -60,7 +59,7 @@ class _Library:
         )
         return answer, status
 
-    def codes(self, x: NDArray[np.int32]) -> list[NDArray[Any]]:
+    def codes(self, x: NDArray[np.int32]) -> list[NDArray[np.number]]:
         """The harness's results for codes `x`: references, drives, codes of these, codes sent, and status bits."""
         real = next(dtype for dtype, name in C_TYPES.items() if name == self._real)
         kinds = (real, real, np.dtype("int32"), np.dtype("int32"), np.dtype("uint8"))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hystgen.compensator import reference
 from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.converter import Conversion
+from hystgen.compensator.converter import CodeConversion
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
 from hystgen.plays import slots
@@ -115,7 +115,7 @@ def _onto_the_bends(
     return outputs
 
 
-def codes(conversion: Conversion, length: int) -> NDArray[np.int64]:
+def codes(conversion: CodeConversion, length: int) -> NDArray[np.int64]:
     """At most `length` codes for both converters, the same every time: their ends and beyond, sweeps, random ones."""
     rng = np.random.default_rng(20261201)
     lines, word = (conversion.reference, conversion.drive), np.iinfo(np.int32)
