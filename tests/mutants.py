@@ -102,7 +102,7 @@ KILLED = (
     Mutant(
         "a drive's code beyond the range is committed as it is", CONVERTER,
         "hystgen_clamp_drive(hystgen_drive_from_code(sent))", "hystgen_drive_from_code(sent)",
-        "coded", "q31",
+        "coded", "float32",
     ),
     Mutant("a limit keeps no status", USUAL, "if (self->bits == 0) {", "if (self->bits < 8u) {", "outside", "q31"),
     Mutant(
