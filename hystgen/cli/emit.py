@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 )
 @common.partial_option
 @common.effects_option
+@click.option("--manifest", is_flag=True, help="also write NAME_manifest.json: hashes, bounds, figures, deviations")
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: object
@@ -75,16 +76,17 @@ def _check(
         found = common.guarded(path, partial(stale.find, folder, files))
         if not found:
             continue
-        partial_too = {"allow_partial": True} if options["allow_partial"] else {}
+        partial_too = {key: True for key in ("allow_partial", "manifest") if options[key]}
         chosen = calls.emit_options(model, **options)
         wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
 
         def again(
-            other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found
+            other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found,
+            partial_too: Mapping[str, bool] = partial_too,
         ) -> list[stale.Difference]:
             try:
                 with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                    made = calls.emitted_files(model, **other, allow_partial=options["allow_partial"])
+                    made = calls.emitted_files(model, **other, **partial_too)
                     return stale.find(folder, made)
             except ValueError:  # the model no longer exists
                 return list(found)

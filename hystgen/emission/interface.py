@@ -6,6 +6,7 @@ import re
 import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
@@ -17,7 +18,7 @@ from hystgen.emission.compensator import EmittedModel, Macro
 from hystgen.emission.cost import Cost
 from hystgen.emission.options import OPTIONS, Options
 from hystgen.emission.runtime import Piece
-from hystgen.emission.text import WIDTH, comment_text, define, literal, operand
+from hystgen.emission.text import WIDTH, Number, comment_text, define, literal, operand
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 
@@ -247,8 +248,7 @@ def typedefs(one: EmittedModel) -> list[str]:
 
 def limits(one: EmittedModel) -> list[str]:
     """The header's macros for a model's numbers."""
-    numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
-    bound, suffix = "against the double model, ", form.suffix
+    numbers, form, units = one.numbers, one.form, one.units
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
     found: list[Macro] = [("N_PLAYS", str(one.model.cascade.pi.n), ""), *_timing(one)]
     words = ("physical units per code; code 0 is 0", "")
@@ -263,43 +263,70 @@ def limits(one: EmittedModel) -> list[str]:
         ("OUTPUT_MIN", operand(ends.output.low[0]), f"{output}, over every drive history in range"),
         ("OUTPUT_MAX", operand(ends.output.high[0]), ""),
     ]
+    found += _codes(one)
+    for each in errors(one):
+        comment = f"{each.what}, {form.counted(each.side, each.unit)}"
+        if each.samples is not None:
+            comment = f"no bound: the largest found in {each.samples} samples, {comment}"
+        if each.condition:
+            comment = f"the same while {each.condition}"
+        found.append((each.macro, operand(each.value), comment))
+    return _defined(one, found)
+
+
+@dataclass(frozen=True)
+class StatedError:
+    """An error that the header states: its macro without the model's prefix, its `value` in the `unit` of a `side`,
+    drive or output; `samples`: None for a bound; `condition`: when a bound holds, empty for always; `what`: of which it
+    is the error."""
+
+    macro: str
+    value: Number
+    side: str
+    unit: str
+    samples: int | None = None
+    condition: str = ""
+    what: str = "against the double model"
+
+
+def errors(one: EmittedModel) -> Iterator[StatedError]:
+    """The errors that the header states."""
+    found, suffix, units = one.numbers.errors, one.form.suffix, one.units
     if "forward" in one.options.operators:
-        found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
+        yield StatedError(f"FORWARD_MAX_ERROR{suffix}", found.forward, "output", units.output)
+    if not one.options.inverse:
+        return
+    drive, measured = ("drive", units.drive), one.measured
+    if measured is None:
+        yield StatedError(f"INVERSE_MAX_ERROR{suffix}", found.inverse, *drive)
+    else:
+        error = one.family.arithmetic.real(measured.error)
+        yield StatedError(f"INVERSE_MEASURED_ERROR{suffix}", error, *drive, measured.samples)
     branch, condition = conditions(one)
-    if one.options.inverse:
-        measured = one.measured
-        if measured is None:
-            found.append((f"INVERSE_MAX_ERROR{suffix}", operand(errors.inverse), bound + drive))
-        else:
-            comment = f"no bound: the largest found in {measured.samples} samples, {bound}{drive}"
-            error = literal(one.family.arithmetic.real(measured.error))
-            found.append((f"INVERSE_MEASURED_ERROR{suffix}", error, comment))
-        stated = measured is None or measured.confirms(float(errors.rounding))
-        if stated and (one.variant.branches or (condition and errors.rounding != errors.inverse)):
-            same = f"the same while {together(branch, condition)}"
-            found.append((f"INVERSE_ROUNDING_ERROR{suffix}", operand(errors.rounding), same))
-    return _defined(one, [*found, *_codes(one)])
+    stated = measured is None or measured.confirms(float(found.rounding))
+    if stated and (one.variant.branches or (condition and found.rounding != found.inverse)):
+        same = together(branch, condition)
+        yield StatedError(f"INVERSE_ROUNDING_ERROR{suffix}", found.rounding, *drive, condition=same)
+    if one.conversion:
+        real, converted = one.family.arithmetic.real, "of a converted code"
+        reference, sent = (real(each) for each in (one.conversion.reference_error, one.conversion.drive_error))
+        yield StatedError(f"REFERENCE_CODE_ERROR{suffix}", reference, "output", units.output, what=converted)
+        yield StatedError(f"DRIVE_CODE_ERROR{suffix}", sent, *drive, what=converted)
 
 
 def _codes(one: EmittedModel) -> list[Macro]:
-    """Macros about the codes of converters."""
-    conversion, form = one.conversion, one.form
-    if conversion is None:
-        return []
+    """Macros for the ends of the converters' codes."""
+    conversion, converters = one.conversion, one.model.parameters.emit.converter
     found: list[Macro] = []
-    real, converters = one.family.arithmetic.real, one.model.parameters.emit.converter
-    assert converters is not None
-    for side, line, error, unit, quantity in (
-        ("reference", conversion.reference, conversion.reference_error, one.units.output, "output"),
-        ("drive", conversion.drive, conversion.drive_error, one.units.drive, "drive"),
+    if conversion is None or converters is None:
+        return found
+    for side, line, of, unit in (
+        ("reference", conversion.reference, converters.reference, one.units.output),
+        ("drive", conversion.drive, converters.drive, one.units.drive),
     ):
-        exact = CodeLine.of(getattr(converters, side))
-        each = f"codes of the {side}'s converter, {float(exact.step):.6g}{f' {unit}' if unit else ''} each"
-        largest = f"of a converted code, {form.counted(quantity, unit)}"
-        found += [
-            (f"{side.upper()}_CODE_MIN", operand(line.least), each), (f"{side.upper()}_CODE_MAX", str(line.most), ""),
-            (f"{side.upper()}_CODE_ERROR{form.suffix}", literal(real(error)), largest),
-        ]
+        each = f"codes of the {side}'s converter, {float(CodeLine.of(of).step):.6g}{f' {unit}' if unit else ''} each"
+        found += [(f"{side.upper()}_CODE_MIN", operand(line.least), each),
+                  (f"{side.upper()}_CODE_MAX", str(line.most), "")]
     return found
 
 
