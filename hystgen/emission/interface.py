@@ -82,15 +82,16 @@ def unbounded(one: EmittedModel) -> list[str]:
 
 
 def reading(one: EmittedModel) -> list[str]:
-    """How the inverse of a model with effects reads the reference: one sentence for each option."""
+    """How the inverse reads the reference: one sentence for each option."""
     compiled = one.compiled
     if compiled is None or not one.options.inverse:
-        return []
-    return [*_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
+        return _converted(one)
+    return [*_converted(one), *_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
 
 
-def unreached(one: EmittedModel) -> list[str]:
-    """A sentence if the codes of the reference's converter do not reach the whole range of references."""
+def _converted(one: EmittedModel) -> list[str]:
+    """A sentence if the codes of the reference's converter do not reach the whole range of references, as is usual:
+    few stages are used over every displacement that some history of drives leads to."""
     both, unit = one.model.parameters.emit.converter, one.units.output
     if one.conversion is None or both is None:
         return []
