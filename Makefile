@@ -12,7 +12,7 @@ JOBS := 2
 # Modules are compiled once, not by each of the hundred or so processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check prove lint fuzz check-bounds blind track docs links clean
+.PHONY: firmware demo test check prove lint fuzz check-bounds blind track docs links clean
 
 # What the demo needs from the package; zig, 410 MB, only where no compiler that `verify` looks for makes a library
 comma := ,
@@ -46,6 +46,10 @@ demo: $(VENV)/demo
 	@$(BIN)/python examples/from_gap_to_firmware -o examples/out/story
 	@echo; echo "These tracking errors as a picture:  examples/out/story/tracking.png"
 	@echo "Open this page first:                examples/out/story/diagnosis/report.html"
+
+# A firmware image for three cores, built and run under qemu: needs gcc-arm-none-eabi, qemu-system-arm, qemu-system-misc
+firmware: $(VENV)/ready
+	$(MAKE) -C examples/firmware HYSTGEN=$(abspath $(BIN))/hystgen ZIG="$(abspath $(BIN))/python -m ziglang"
 
 # Every feature once, without tests marked thorough; each file in one process, which compiles its functions once
 test: $(VENV)/ready

@@ -139,6 +139,7 @@ class ParameterKeys(Generated):
         "Units": "units", "ModelParameters": "model", "PIParameters": "pi", "DensityParameters": "density",
         "DensityTable": "table", "DeadZoneParameters": "dead_zone", "TanhParameters": "tanh",
         "TanhBranch": "branch", "EmitDefaults": "emit", "Compensation": "compensation",
+        "Converters": "converter", "Converter": "reference and drive",
     }  # fmt: skip
 
     def lines(self) -> Iterator[str]:

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chained import Compensator
+    from hystgen.compensator.converter import CodeConversion
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
 
@@ -252,18 +254,55 @@ class Model:
 
         seconds = self.parameters.sample_time
         assert seconds is not None, "need_compensated asks for it"
-        how = self.parameters.emit.compensation
-        return chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb, engine)
+        emit, (drive, output) = self.parameters.emit, self._lsb
+        if drive is None and emit.converter and emit.compensation.quiet and arithmetic not in FIXED:
+            from hystgen.compensator.converter import CodeLine
+
+            drive = float(abs(CodeLine.of(emit.converter.drive).step))
+        return chain_tables.build(self.chain, arithmetic, seconds, emit.compensation, (drive, output), engine)
 
     def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:
         """Drive and output units per code in a fixed-point arithmetic. Raises FormatError."""
+        drive, output = self._exact_lsb(arithmetic, engine)
+        return float(drive), float(output)
+
+    def _exact_lsb(self, arithmetic: str, engine: str) -> tuple[Fraction, Fraction]:
         from hystgen.compensator import fixed_tables
 
         codes = self.compiled(arithmetic, engine).codes if self.effects else None
         if codes is not None:
-            return float(codes.drive_lsb), float(codes.output_lsb)
-        drive, output = fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
-        return float(drive), float(output)
+            return codes.drive_lsb, codes.output_lsb
+        return fixed_tables.lsbs(self.cascade, arithmetic, *self._lsb)
+
+    def conversion(self, arithmetic: str, engine: str = "loop") -> CodeConversion | None:
+        """Conversions between the codes of `emit.converter` and the emitted C's numbers; None without converters.
+
+        Raises FormatError if the arithmetic is too coarse for them, or the drive's converter for a slew limit.
+        """
+        from hystgen.compensator import converter
+
+        both, seconds = self.parameters.emit.converter, self.parameters.sample_time
+        if both is None:
+            return None
+        if self.effects and seconds:
+            self._check_slew(float(abs(converter.CodeLine.of(both.drive).step)), seconds)
+        lsb = self._exact_lsb(arithmetic, engine) if arithmetic in FIXED else None
+        return converter.of(both, ARITHMETICS[arithmetic], lsb)
+
+    def _check_slew(self, step: float, seconds: float) -> None:
+        """Raise FormatError if a slew limit is less than one `step` of the drive's converter per sample: each sample
+        begins at the drive that the converter made, so that the drive would stand still."""
+        from hystgen.compensator.chain.layout import rates
+        from hystgen.compensator.chain.parts import Parts
+
+        least = min(map(float, rates(Parts.of(self.effects), seconds)), default=step)
+        if least < step:
+            unit = self.parameters.units.input or "input units"
+            words = (
+                f"a step of this converter is {step:.3g} {unit}, and the slew limit allows {least:.3g} {unit} in "
+                f"{seconds:.3g} s, so the drive would stand still; give more bits, or a longer sample_time"
+            )
+            raise FormatError((("emit", "converter", "drive", "bits"), words))
 
     @property
     def _lsb(self) -> tuple[float | None, float | None]:
@@ -316,6 +355,28 @@ class Model:
         run = self.run(drives, t, extra, clamp)
         said = remarks.forward(drives, self.cascade.input_range, clamp, int(np.count_nonzero(held)))
         return self.chain.simulate([run])[0], said
+
+    def inverse_codes(
+        self, codes: ArrayLike, arithmetic: str | None = None, engine: str | None = None
+    ) -> NDArray[np.int64]:
+        """Codes (N,) of drives for codes (N,) of references, as NAME_inverse_step_code of the emitted C gives them.
+
+        Each step commits the drive that its code makes. Without `arithmetic` or `engine`, those of the parameter file.
+        Raises ValueError without `emit.converter` in the parameter file and for codes that are not whole numbers, and
+        what `emit` raises.
+        """
+        from hystgen.compensator import converter
+
+        given = arguments.signal("codes", codes)
+        if not np.all(given == np.rint(given)):
+            raise ValueError("codes must be whole numbers")
+        chosen = arithmetic or self.parameters.emit.arithmetic
+        check_arithmetic(chosen)
+        picked = self.engine(engine, "inverse", chosen)
+        conversion = self.conversion(chosen, picked)
+        if conversion is None:
+            raise ValueError("the parameter file has no emit.converter; add the converters of references and drives")
+        return converter.steps(self.tables(chosen, picked, "inverse"), conversion, given)[0]
 
     def _drive_at_start(self) -> float:
         """The drive that belongs to the start memory, used for leading samples that are not finite."""

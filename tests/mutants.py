@@ -12,6 +12,7 @@ from modelfiles import BRAKED, CALM, CHAINS, FILES, LED, PLAYS, STEADY, head
 
 ALONE = "hystgen/effects/slew_limit/slewed.c"
 CODES = "c_runtime/compensator/code.c"
+CONVERTER = "c_runtime/compensator/converter.c"
 FINER = "c_runtime/front/front.c"
 CORNERS = "c_runtime/plays/corners_fixed.c"
 USUAL = "c_runtime/compensator/corners/inverse_fixed.c"
@@ -45,6 +46,8 @@ MODELS = {
     "steady": STEADY,
     "braked": BRAKED,
     "calm": CALM,
+    "coded": head("coded") + PLAYS + "emit: {converter: {reference: {bits: 12, range: [-9, 9], "
+    "coding: twos-complement}, drive: {bits: 8, range: [-5, 5.1], coding: offset-binary}}}\n",
     # the plays that start lowest begin to follow right at the limit
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit
@@ -80,6 +83,27 @@ class Mutant:
 
 
 KILLED = (
+    Mutant(
+        "a code of the drive is not committed", CONVERTER,
+        "    hystgen_inverse_commit(self, hystgen_clamp_drive(hystgen_drive_from_code(sent)));\n",
+        "    hystgen_inverse_commit(self, drive);\n",
+        "coded", "float32",
+    ),
+    Mutant(
+        "a drive's code is cut off", CONVERTER,
+        "    return part + part < 1 ? whole : whole + 1;", "    return whole;",
+        "coded", "float32",
+    ),
+    Mutant(
+        "a code beyond the converter's is used", CONVERTER,
+        "    return above > most ? most : above;", "    return above;",
+        "coded", "q15",
+    ),
+    Mutant(
+        "a drive's code beyond the range is committed as it is", CONVERTER,
+        "hystgen_clamp_drive(hystgen_drive_from_code(sent))", "hystgen_drive_from_code(sent)",
+        "coded", "float32",
+    ),
     Mutant("a limit keeps no status", USUAL, "if (self->bits == 0) {", "if (self->bits < 8u) {", "outside", "q31"),
     Mutant(
         "a usual step is not taken back, float", INVERSE,

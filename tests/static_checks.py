@@ -23,14 +23,13 @@ from pathlib import Path
 
 import units
 from modelfiles import CHAINS, FILES, LED
-from ruamel.yaml import YAML
 
 import hystgen
+from hystgen.emission import manifest
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.verification.compilers import C_WARNINGS
 
-DEVIATIONS = Path(__file__).parent / "deviations.yaml"
 TOOLS = ("cppcheck", "clang-tidy", "gcc", "clang-format")
 
 
@@ -199,9 +198,9 @@ def problems(findings: Sequence[Finding], listed: Mapping[str, Mapping[str, str]
 
 def deviations() -> dict[str, dict[str, str]]:
     """Listed deviations: for each tool, the reason for each rule."""
-    listed = YAML(typ="safe").load(DEVIATIONS.read_text(encoding="utf-8"))
-    assert all(len(str(reason).split()) > 5 for rules in listed.values() for reason in rules.values())
-    return {tool: {str(rule): reason for rule, reason in rules.items()} for tool, rules in listed.items()}
+    listed = manifest.deviations()
+    assert all(len(reason.split()) > 5 for rules in listed.values() for reason in rules.values())
+    return listed
 
 
 def main() -> int:

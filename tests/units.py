@@ -68,6 +68,8 @@ ANALYSED = (
     ("gliding", "q15", "loop"),
     ("sloping", "float32", "loop"),
     ("sloping", "q31", "loop"),
+    ("coded", "float32", "corners"),
+    ("coded", "q31", "corners"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""

@@ -15,7 +15,15 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v)
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u);
 /* Reports, after a step, the drive actually applied in place of the one returned. */
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied);
+/* One sample from code to code. Commits the drive that the returned code makes. Cannot fail. */
+int32_t hystgen_inverse_step_code(hystgen_inverse_t *self, int32_t code);
 #endif
+/* The reference that a code of the reference's converter stands for. */
+hystgen_real_t hystgen_reference_from_code(int32_t code);
+/* The drive that a code of the drive's converter makes. */
+hystgen_real_t hystgen_drive_from_code(int32_t code);
+/* The code whose drive is nearest to this one, among those of the drive's converter. */
+int32_t hystgen_code_from_drive(hystgen_real_t drive);
 /* HYSTGEN_STATUS_* bits since the last call; reading clears them. */
 unsigned int hystgen_operator_status(hystgen_operator_t *self);
 

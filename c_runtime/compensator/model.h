@@ -58,6 +58,20 @@ extern const hystgen_curve_t hystgen_operator_curve;
 extern const hystgen_start_t hystgen_operator_start[2];
 #endif
 
+#define HYSTGEN_REFERENCE_CODE_MIN 0
+#define HYSTGEN_REFERENCE_CODE_MAX 4095
+#define HYSTGEN_REFERENCE_AT_ZERO HYSTGEN_OUTPUT_MIN
+#define HYSTGEN_REFERENCE_STEP 1
+#define HYSTGEN_REFERENCE_BITS 1u
+#define HYSTGEN_DRIVE_CODE_MIN (-2048)
+#define HYSTGEN_DRIVE_CODE_MAX 2047
+#define HYSTGEN_DRIVE_AT_ZERO 0
+#define HYSTGEN_DRIVE_STEP 1
+#define HYSTGEN_DRIVE_STEP_BITS 1u
+#define HYSTGEN_CODE_AT_ZERO 0
+#define HYSTGEN_CODE_STEP 1
+#define HYSTGEN_CODE_STEP_BITS 1u
+
 #ifdef HYSTGEN_HAS_FRONT
 #ifdef HYSTGEN_FIXED
 #define HYSTGEN_FRONT_PIECES 20u

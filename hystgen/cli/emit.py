@@ -51,6 +51,7 @@ class Emitted:
 @common.quiet_option
 @common.partial_option
 @common.effects_option
+@click.option("--manifest", is_flag=True, help="also write NAME_manifest.json: hashes, bounds, figures, deviations")
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
@@ -127,7 +128,7 @@ def _check(
         )
         if found:
             chosen = calls.emit_options(one.model, **options)
-            differing.append(_stale(one, found, chosen, options["allow_partial"]))
+            differing.append(_stale(one, found, chosen, {key: options[key] for key in UNSEALED if options[key]}))
     for folder in dict.fromkeys(one.folder for one in made):
         own = [one for one in made if one.folder == folder]
         written = {name for one in own for name in one.files}
@@ -144,18 +145,24 @@ def _check(
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
 
 
-def _stale(one: Emitted, found: list[stale.Difference], chosen: Options, allow_partial: bool) -> stale.Stale:
-    """A model whose files differ, with the options chosen for it."""
+UNSEALED = ("allow_partial", "manifest")
+"""Options that a banner does not contain."""
+
+
+def _stale(
+    one: Emitted, found: list[stale.Difference], chosen: Options, unsealed: Mapping[str, Any]
+) -> stale.Stale:
+    """A model whose files differ, with the options chosen for it; `unsealed`: those that a banner does not contain."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
 
     def again(other: Mapping[str, str]) -> list[stale.Difference]:
         try:
             with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                files = calls.emitted_files(one.model, **other, allow_partial=allow_partial)
+                files = calls.emitted_files(one.model, **other, **unsealed)
                 return stale.find(one.folder, files)
         except ValueError:  # the model no longer exists
             return list(found)
 
-    wanted = {key: getattr(chosen, key) for key in OPTIONS} | ({"allow_partial": True} if allow_partial else {})
+    wanted = {key: getattr(chosen, key) for key in OPTIONS} | dict(unsealed)
     return stale.Stale(one.parameters, found, wanted, again)

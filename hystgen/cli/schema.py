@@ -1,4 +1,4 @@
-"""`hystgen schema`: the JSON Schema of the parameter file."""
+"""`hystgen schema`: the JSON Schemas of the parameter file and of the manifest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from hystgen.basics import console
 
 
 @click.command()
-def schema() -> None:
+@click.option("--manifest", is_flag=True, help="that of NAME_manifest.json, which emit --manifest writes")
+def schema(manifest: bool) -> None:
     """Print the JSON Schema of the parameter file.
 
     Editors use it if the file begins with  # yaml-language-server: $schema=hystgen.schema.json
@@ -17,6 +18,9 @@ def schema() -> None:
     """
     import json
 
-    from hystgen.parameters.schema import schema as parameter_schema
+    if manifest:
+        from hystgen.emission.manifest import schema as wanted
+    else:
+        from hystgen.parameters.schema import schema as wanted
 
-    console.say(json.dumps(parameter_schema(), indent=2))
+    console.say(json.dumps(wanted(), indent=2))

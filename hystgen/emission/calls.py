@@ -37,10 +37,12 @@ def emit_options(
     layout: str = "self-contained",
     optimize: str | None = None,
     allow_partial: bool = False,
+    manifest: bool = False,
 ) -> Options:
     """The options to emit with: the arguments given, else the parameter file's `emit` section.
 
-    `allow_partial`: effects that the C cannot include are left out, and named in its banner.
+    `allow_partial`: effects that the C cannot include are left out, and named in its banner; `manifest`: whether to
+    write a manifest too.
     """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
@@ -59,7 +61,8 @@ def emit_options(
     model.need_compensated(arithmetic, operator)
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
-    return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout, left_out)
+    engine = model.engine(engine, operator, arithmetic, optimize)
+    return Options(operator, arithmetic, engine, layout, left_out, manifest)
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
@@ -99,7 +102,12 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
         whole = module.of(kept, chosen, parameters_sha256(model.parameters))
         for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
-        made |= module.files(whole)
+        files = module.files(whole)
+        if chosen.manifest:
+            from hystgen.emission import manifest
+
+            files |= manifest.file(whole, files)
+        made |= files
     return made
 
 
@@ -147,7 +155,8 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
-    single-header; `allow_partial` leaves out effects that the C cannot include. Missing options come from the file.
+    single-header; `allow_partial` leaves out effects that the C cannot include; `manifest` writes NAME_manifest.json as
+    well. Missing options come from the file.
     Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
     UnsupportedEffectsError, before anything is written.
     """

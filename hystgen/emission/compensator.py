@@ -25,6 +25,7 @@ from hystgen.plays.slots import Reals
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
+    from hystgen.compensator.converter import CodeConversion
     from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
@@ -414,7 +415,8 @@ class UnitTexts:
 
 @dataclass(frozen=True)
 class EmittedModel:
-    """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain."""
+    """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain;
+    `conversion`: None unless the inverse has converters."""
 
     model: Model
     options: Options
@@ -425,6 +427,7 @@ class EmittedModel:
     numbers: Numbers
     compiled: Compiled | None
     glue: Glue | None
+    conversion: CodeConversion | None = None
 
     @cached_property
     def measured(self) -> Measured | None:

@@ -155,10 +155,11 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
     return Cost(code, memory, avr if known else None, worst, dearest)
 
 
-def selftest_bytes(real: int, memory: MemoryBytes, samples: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, with `real` bytes per number, and of the instance that its operators share."""
+def selftest_bytes(real: int, memory: MemoryBytes, samples: int, codes: int, layout: Layout) -> tuple[int, int]:
+    """Bytes of a self-test's samples, with `real` bytes per number, and of its pairs of codes; bytes of the instance
+    that its operators share."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
-    return samples * sample, max(size for _, size in memory.instances)
+    return samples * sample + 8 * codes, max(size for _, size in memory.instances)
 
 
 @dataclass(frozen=True)

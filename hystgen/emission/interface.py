@@ -6,17 +6,19 @@ import re
 import shlex
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
+from hystgen.compensator.converter import CodeLine
 from hystgen.emission import cost, runtime
 from hystgen.emission.compensator import EmittedModel, Macro
 from hystgen.emission.cost import Cost
 from hystgen.emission.options import OPTIONS, Options
 from hystgen.emission.runtime import Piece
-from hystgen.emission.text import WIDTH, comment_text, define, literal, operand
+from hystgen.emission.text import WIDTH, Number, comment_text, define, literal, operand
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 
@@ -80,11 +82,26 @@ def unbounded(one: EmittedModel) -> list[str]:
 
 
 def reading(one: EmittedModel) -> list[str]:
-    """How the inverse of a model with effects reads the reference: one sentence for each option."""
+    """How the inverse reads the reference: one sentence for each option."""
     compiled = one.compiled
     if compiled is None or not one.options.inverse:
+        return _converted(one)
+    return [*_converted(one), *_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
+
+
+def _converted(one: EmittedModel) -> list[str]:
+    """A sentence if the codes of the reference's converter do not reach the whole range of references, as is usual:
+    few stages are used over every displacement that some history of drives leads to."""
+    both, unit = one.model.parameters.emit.converter, one.units.output
+    if one.conversion is None or both is None:
         return []
-    return [*_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
+    lsb = float(one.numbers.lsb[1]) if one.numbers.lsb else 1.0
+    low, high = (lsb * float(end) for end in one.numbers.tables.limits.output[0])
+    least, most = sorted(both.reference.range)
+    if least <= low and high <= most:
+        return []
+    reached, needed = (f"{a:.5g} .. {b:.5g} {unit}".rstrip() for a, b in ((least, most), (low, high)))
+    return [f"Converter: codes of references reach {reached}, and the model's range is {needed}"]
 
 
 def _averaged(compiled: Compiled) -> list[str]:
@@ -189,13 +206,13 @@ def _model(one: EmittedModel) -> str:
     return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
 
 
-def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
-    """The memory that the self-test takes."""
+def selftest_cost(options: Options, found: Cost, samples: int, codes: int) -> list[str]:
+    """The memory that the self-test takes, with this many samples and codes."""
     real = ARITHMETICS[options.arithmetic].bytes
-    constants, instance = cost.selftest_bytes(real, found.memory, samples, cost.CORE_32)
+    constants, instance = cost.selftest_bytes(real, found.memory, samples, codes, cost.CORE_32)
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
     if found.avr is not None:
-        both = sum(cost.selftest_bytes(real, found.avr, samples, cost.AVR))
+        both = sum(cost.selftest_bytes(real, found.avr, samples, codes, cost.AVR))
         lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in total")
     return lines
 
@@ -232,8 +249,7 @@ def typedefs(one: EmittedModel) -> list[str]:
 
 def limits(one: EmittedModel) -> list[str]:
     """The header's macros for a model's numbers."""
-    numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
-    bound, suffix = "against the double model, ", form.suffix
+    numbers, form, units = one.numbers, one.form, one.units
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
     found: list[Macro] = [("N_PLAYS", str(one.model.cascade.pi.n), ""), *_timing(one)]
     words = ("physical units per code; code 0 is 0", "")
@@ -248,22 +264,71 @@ def limits(one: EmittedModel) -> list[str]:
         ("OUTPUT_MIN", operand(ends.output.low[0]), f"{output}, over every drive history in range"),
         ("OUTPUT_MAX", operand(ends.output.high[0]), ""),
     ]
-    if "forward" in one.options.operators:
-        found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
-    branch, condition = conditions(one)
-    if one.options.inverse:
-        measured = one.measured
-        if measured is None:
-            found.append((f"INVERSE_MAX_ERROR{suffix}", operand(errors.inverse), bound + drive))
-        else:
-            comment = f"no bound: the largest found in {measured.samples} samples, {bound}{drive}"
-            error = literal(one.family.arithmetic.real(measured.error))
-            found.append((f"INVERSE_MEASURED_ERROR{suffix}", error, comment))
-        stated = measured is None or measured.confirms(float(errors.rounding))
-        if stated and (one.variant.branches or (condition and errors.rounding != errors.inverse)):
-            same = f"the same while {together(branch, condition)}"
-            found.append((f"INVERSE_ROUNDING_ERROR{suffix}", operand(errors.rounding), same))
+    found += _codes(one)
+    for each in errors(one):
+        comment = f"{each.what}, {form.counted(each.side, each.unit)}"
+        if each.samples is not None:
+            comment = f"no bound: the largest found in {each.samples} samples, {comment}"
+        if each.condition:
+            comment = f"the same while {each.condition}"
+        found.append((each.macro, operand(each.value), comment))
     return _defined(one, found)
+
+
+@dataclass(frozen=True)
+class StatedError:
+    """An error that the header states: its macro without the model's prefix, its `value` in the `unit` of a `side`,
+    drive or output; `samples`: None for a bound; `condition`: when a bound holds, empty for always; `what`: of which it
+    is the error."""
+
+    macro: str
+    value: Number
+    side: str
+    unit: str
+    samples: int | None = None
+    condition: str = ""
+    what: str = "against the double model"
+
+
+def errors(one: EmittedModel) -> Iterator[StatedError]:
+    """The errors that the header states."""
+    found, suffix, units = one.numbers.errors, one.form.suffix, one.units
+    if "forward" in one.options.operators:
+        yield StatedError(f"FORWARD_MAX_ERROR{suffix}", found.forward, "output", units.output)
+    if not one.options.inverse:
+        return
+    drive, measured = ("drive", units.drive), one.measured
+    if measured is None:
+        yield StatedError(f"INVERSE_MAX_ERROR{suffix}", found.inverse, *drive)
+    else:
+        error = one.family.arithmetic.real(measured.error)
+        yield StatedError(f"INVERSE_MEASURED_ERROR{suffix}", error, *drive, measured.samples)
+    branch, condition = conditions(one)
+    stated = measured is None or measured.confirms(float(found.rounding))
+    if stated and (one.variant.branches or (condition and found.rounding != found.inverse)):
+        same = together(branch, condition)
+        yield StatedError(f"INVERSE_ROUNDING_ERROR{suffix}", found.rounding, *drive, condition=same)
+    if one.conversion:
+        real, converted = one.family.arithmetic.real, "of a converted code"
+        reference, sent = (real(each) for each in (one.conversion.reference_error, one.conversion.drive_error))
+        yield StatedError(f"REFERENCE_CODE_ERROR{suffix}", reference, "output", units.output, what=converted)
+        yield StatedError(f"DRIVE_CODE_ERROR{suffix}", sent, *drive, what=converted)
+
+
+def _codes(one: EmittedModel) -> list[Macro]:
+    """Macros for the ends of the converters' codes."""
+    conversion, converters = one.conversion, one.model.parameters.emit.converter
+    found: list[Macro] = []
+    if conversion is None or converters is None:
+        return found
+    for side, line, of, unit in (
+        ("reference", conversion.reference, converters.reference, one.units.output),
+        ("drive", conversion.drive, converters.drive, one.units.drive),
+    ):
+        each = f"codes of the {side}'s converter, {float(CodeLine.of(of).step):.6g}{f' {unit}' if unit else ''} each"
+        found += [(f"{side.upper()}_CODE_MIN", operand(line.least), each),
+                  (f"{side.upper()}_CODE_MAX", str(line.most), "")]
+    return found
 
 
 def _timing(one: EmittedModel) -> list[Macro]:
@@ -342,15 +407,23 @@ CALLS = {
     "correct": CallFacts(
         "after a step, when the sensor's value belongs to the drive that was applied before that step", _FEW, _SET
     ),
+    "reference_from_code": CallFacts("at any time", _FEW),
+    "drive_from_code": CallFacts("at any time", _FEW),
+    "code_from_drive": CallFacts("at any time", _FEW),
+    "step_code": CallFacts(
+        "after init; once every sample time, from one context, in place of step and commit",
+        "that of a step, of commit and of three conversions",
+        ("INPUT_CLAMPED", "OUTPUT_CLAMPED", "DOMAIN", "SLEW_LIMITED"),
+    ),
 }
 """The calls of the interface."""
 
-_PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
+_PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_((?P<op>forward|inverse)_)?(?P<call>\w+)\((?P<given>[^)]*)\);")
 
 
-def documented(pieces: Sequence[Piece], one: EmittedModel, cost: Cost) -> Iterator[Piece]:
+def documented(one: EmittedModel, cost: Cost) -> Iterator[Piece]:
     """Prototypes of a model's interface, each below its documentation."""
-    for piece in pieces:
+    for piece in runtime.prototypes_of(one.variant, one.options.operators, one.calls):
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
         brief = piece.text.partition("/*")[2].partition("*/")[0]
@@ -400,11 +473,18 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         "d": _unit("output", one),
         "measured": _unit("output", one),
         "travel": "total distance that the drive has moved, in units of the drive",
+        "code": f"code of the converter, {macros}_{'DRIVE' if call == 'drive_from_code' else 'REFERENCE'}_CODE_MIN .. "
+        "MAX, beyond which it is limited; codes in two's complement have their sign extended to 32 bits",
+        "drive": _unit("drive", one) + "; NaN gives the lowest code" * bool(held),
     }[name]
-    return what + held
+    return what + held * (name not in ("code", "drive"))
 
 
-def _answer(call: str, op: str, one: EmittedModel) -> str:
+def _answer(call: str, op: str | None, one: EmittedModel) -> str:
+    if call in ("step_code", "code_from_drive"):
+        return f"code of the drive's converter, {one.names.NAME}_DRIVE_CODE_MIN .. MAX"
+    if call in ("reference_from_code", "drive_from_code"):
+        return _unit(call.partition("_")[0], one)
     if call == "status":
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "travel":
@@ -412,7 +492,7 @@ def _answer(call: str, op: str, one: EmittedModel) -> str:
     return _unit("drive" if op == "inverse" and call == "step" else "output", one)
 
 
-def _bits(call: str, op: str, one: EmittedModel) -> str:
+def _bits(call: str, op: str | None, one: EmittedModel) -> str:
     if call == "reset":
         return "cleared, then those of the step"
     if call == "status":
@@ -427,8 +507,8 @@ def _bits(call: str, op: str, one: EmittedModel) -> str:
     return ", ".join(found) or "none"
 
 
-def _cost(call: str, op: str, one: EmittedModel, cost: Cost) -> str:
-    if call == "step":
+def _cost(call: str, op: str | None, one: EmittedModel, cost: Cost) -> str:
+    if op and call == "step":
         return f"at most {dict(cost.worst_case)[op]}"
     if call == "commit" and one.corners and not one.variant.chain:
         return "at most that of a step"

@@ -16,7 +16,7 @@ from hystgen.emission.cost import Cost, Data
 from hystgen.emission.folding import PLAIN, Members
 from hystgen.emission.options import Options, seal
 from hystgen.emission.runtime import template
-from hystgen.emission.text import define, fit
+from hystgen.emission.text import define, fit, operand
 from hystgen.parameters.files import parameters_sha256
 from hystgen.plays import slots
 
@@ -45,11 +45,16 @@ def compensator(model: Model, options: Options) -> EmittedModel:
     else:
         numbers = form.numbers(model, options, writer)
     variant = _variant(options, family, model.cascade, numbers, compiled)
+    conversion = model.conversion(options.arithmetic, options.engine) if options.inverse else None
+    if conversion:
+        variant = dataclasses.replace(variant, coded=True)
+        macros = ((name, operand(value), "") for name, value in conversion.macros)
+        numbers = dataclasses.replace(numbers, macros=(*numbers.macros, *macros))
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
     elif loop:
         glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
-    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue)
+    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue, conversion)
 
 
 def _variant(
@@ -221,7 +226,8 @@ def of(model: Model, options: Options, sha256: str = "") -> Module:
         dynamic = doubts.found(model.parameters, one.compiled)
     return Module(
         one, made, cost.estimate(model.cascade, options, one.numbers.tables, made.data),
-        sha256 or parameters_sha256(model.parameters), interface.reading(one), [*dynamic, *interface.unbounded(one)],
+        sha256 or parameters_sha256(model.parameters), interface.reading(one),
+        [*dynamic, *interface.unbounded(one)],
     )
 
 
@@ -243,10 +249,7 @@ def files(module: Module) -> dict[str, str]:
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,
             banner=top(f"{name}.h", f"{WHAT[options.operator]} of {name}", details),
             build=runtime.verbatim(family.build, name, family, name),
-            api=runtime.api(
-                options.operators, name, one.names.rt, family, one.calls,
-                lambda pieces: interface.documented(pieces, one, module.cost),
-            ),
+            api=runtime.api(interface.documented(one, module.cost), name, one.names.rt, family),
             implementation=whole if single else "",
         )
     }
@@ -257,13 +260,14 @@ def files(module: Module) -> dict[str, str]:
     if shared:
         found |= runtime_files(options.arithmetic)
     operators = selftest.operators(one)
-    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators))
+    codes = selftest.codes(one)
+    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators), len(codes))
     for ending, about, more in (
         (".h", f"checks {name} on the target", costs),
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        text = template(f"selftest{ending}.j2", operators=operators, unread=slots.OP_UNREAD)
+        text = template(f"selftest{ending}.j2", operators=operators, codes=codes, unread=slots.OP_UNREAD)
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}

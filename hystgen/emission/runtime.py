@@ -11,7 +11,7 @@ import functools
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -72,6 +72,11 @@ FIXED_KERNELS = (
 
 
 APART = "HYSTGEN_APART "
+
+CODED = (
+    "hystgen_reference_from_code", "hystgen_drive_from_code", "hystgen_code_from_drive", "hystgen_inverse_step_code",
+)
+"""Calls of an inverse with converters."""
 
 
 @dataclass(frozen=True)
@@ -246,7 +251,8 @@ class Variant:
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
     `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
     add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
-    `elements`: number of elements in parallel with them; `tilted`: their drive is.
+    `elements`: number of elements in parallel with them; `tilted`: their drive is; `coded`: the inverse takes and
+    returns codes of converters.
     """
 
     engine: str
@@ -268,6 +274,7 @@ class Variant:
     bends: str = ""
     elements: int = 0
     tilted: bool = False
+    coded: bool = False
 
     @property
     def apart(self) -> tuple[str, ...]:
@@ -310,7 +317,8 @@ class Variant:
         files += self.family.codes
         files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
-        return (*files, "compensator/drive.c", *own, "compensator/status.c")
+        converter = ("compensator/converter.c",) * self.coded
+        return (*files, "compensator/drive.c", *own, "compensator/status.c", *converter)
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
@@ -567,7 +575,7 @@ def operator_pieces(
     `api`; `own`: functions of a user's own blocks, which stay unchanged; `types`: those that no kernel uses."""
     family = variant.family
     blocks = family.chain_blocks if variant.chain else ()
-    roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
+    roots = [piece.name for piece in prototypes_of(variant, operators, calls)]
     facts = family.facts | variant.facts
     every = [*_pieces(blocks, facts), *own, *split_pieces(chosen(glue, facts)), *_pieces(variant.sources(), facts)]
     pieces = needed(every, roots)
@@ -607,10 +615,17 @@ def piece_of(text: str) -> Piece:
     return Piece(own, text, frozenset(_NAME.findall(code)) - {own}, tuple(members))
 
 
+def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
+    """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
+    coded = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name in CODED] if variant.coded else []
+    return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *coded]
+
+
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     """Prototypes of an operator: those of every model, and those named in `more` of models with effects."""
     prefix = f"hystgen_{operator}_"
-    usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
+    every = _pieces(["compensator/api.h"], ())
+    usual = [piece for piece in every if piece.name.startswith(prefix) and piece.name not in CODED]
     chain = {prefix + each for each in more}
     return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 
@@ -719,14 +734,9 @@ def render_operators(
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name, known)
 
 
-def api(
-    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]],
-    documented: Callable[[Sequence[Piece]], Iterable[Piece]],
-) -> str:
-    """Prototypes of a model's functions; `calls`: additional functions by operator; `documented`: puts the
-    documentation above each prototype."""
-    every = [piece for op in operators for piece in documented(_calls(op, calls.get(op, ())))]
-    return _named("\n".join(piece.text for piece in every), prefix, family, name)
+def api(documented: Iterable[Piece], name: str, prefix: str, family: Family) -> str:
+    """Prototypes of a model's functions below their documentation."""
+    return _named("\n".join(piece.text for piece in documented), prefix, family, name)
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:

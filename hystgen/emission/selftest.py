@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hystgen.compensator import reference
+from hystgen.compensator import converter, reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.compensator import EmittedModel
@@ -67,6 +67,24 @@ def operators(one: EmittedModel) -> list[Operator]:
         settings = [(LETTERS[call], call) for call in own]
         found.append(Operator(name, settings, _samples(one, name == "inverse", own)))
     return found
+
+
+CODES = 60
+"""[samples] Steps from code to code: about as many of each kind, slow and fast, as of ordinary steps."""
+
+
+def codes(one: EmittedModel) -> list[tuple[str, str]]:
+    """Codes of references and, for an inverse with converters, the codes of drives that they should give."""
+    conversion = one.conversion
+    if conversion is None:
+        return []
+    line, numbers = conversion.reference, one.numbers.tables
+    low, high = (float(end) for end in numbers.limits.output[0])
+    ends = sorted((end - float(line.zero)) / float(line.step) for end in (low, high))
+    given = np.rint([ends[0] + part * (ends[1] - ends[0]) for part in _fractions(3 * CODES)[:: 3]]).astype(np.int64)
+    given = np.clip(given, line.least - 1, line.most + 1)  # codes beyond the converter's are limited
+    sent, _ = converter.steps(numbers, conversion, given, compiled=False)
+    return [(literal(a), literal(b)) for a, b in zip(given, sent, strict=True)]
 
 
 def _setting(t: ChainTables, call: str, turn: int) -> float:

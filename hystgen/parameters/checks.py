@@ -43,6 +43,9 @@ _PARTS: dict[str, type[BaseModel]] = {
     "descending": schema.TanhBranch,
     "emit": schema.EmitDefaults,
     "compensation": schema.Compensation,
+    "converter": schema.Converters,
+    "reference": schema.Converter,
+    "drive": schema.Converter,
 }
 
 _PLACES: dict[str, type[BaseModel]] = {
@@ -69,6 +72,11 @@ _WRITTEN = {
     "p": "p: [0.8, 0.2, 0.1]",
     "p0": "p0: 0.7",
     "r_max": "r_max: 10",
+    "reference": "reference: {bits: 16, range: [0, 20], coding: offset-binary}",
+    "drive": "drive: {bits: 16, range: [-10, 110], coding: offset-binary}",
+    "bits": "bits: 16",
+    "range": "range: [-10, 110]",
+    "coding": "coding: offset-binary` or `coding: twos-complement",
 }
 
 
@@ -255,6 +263,8 @@ class _Checker:
         ends = self.get("input_range")
         if ends is not None and not ends[0] < ends[1]:
             self.add(("input_range",), f"{shown(ends[0])} is not below {shown(ends[1])}; write [lowest, highest]")
+        for side in ("reference", "drive"):
+            self._converter(("emit", "converter", side), ends if side == "drive" else None)
         if isinstance(self.at(("model", "pi")), Mapping):
             self._pi(("model", "pi"))
         stages = self.at(("model", "memoryless"))
@@ -266,6 +276,21 @@ class _Checker:
         if isinstance(listed := self.at(("model", "effects")), tuple):
             for i, effect in enumerate(listed[: schema.MAX_EFFECTS]):
                 self._effect(("model", "effects", i), effect)
+
+    def _converter(self, path: Path, needed: tuple[float, float] | None) -> None:
+        """A converter, whose codes reach every quantity in the range `needed`."""
+        ends = self.get(*path, "range")
+        if ends is None:
+            return
+        low, high = float(min(ends)), float(max(ends))
+        if low == high:
+            self.add((*path, "range"), "both ends are the same; write the quantities at the lowest and highest code")
+        elif needed is not None and not (low <= needed[0] and needed[1] <= high):
+            self.add(
+                (*path, "range"),
+                f"reaches {shown(low)} .. {shown(high)}, but input_range is {shown(needed[0])} .. {shown(needed[1])}; "
+                "correct the range, or narrow input_range to what the converter reaches",
+            )
 
     def _text(self, path: Path, lines: bool) -> None:
         text = self.get(*path) or ""
@@ -533,7 +558,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         wrong, advice = "must be a stage or a list of stages", _KINDS
     if kind == "finite_number" or (kind == "float_type" and type(value) is int):
         return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in magnitude"
-    if key == "input_range" and kind in ("too_long", "tuple_type"):
+    if key in ("input_range", "range") and kind in ("too_long", "tuple_type"):
         return _TWO_NUMBERS
     if wrong:
         return f"{wrong}, not {shown(value)}; {advice}"
@@ -542,7 +567,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if kind == "literal_error" and not key:  # in a list
         return _choice(value, re.findall(r"'([^']*)'", context["expected"]))
     if kind == "literal_error":
-        fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
+        parts = (schema.EmitDefaults, schema.Compensation, schema.Converter)
+        fields = {name: field for part in parts for name, field in part.model_fields.items()}
         return _choice(value, get_args(fields[key].annotation) if key != "kind" else schema.STAGE_KINDS)
     if kind in _BOUNDS:
         limit, what = _BOUNDS[kind]

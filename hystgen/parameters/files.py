@@ -147,9 +147,8 @@ def canonical_json(parameters: Parameters) -> str:
     """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
     A density appears as given, not as the plays made from it. `emit.output` is left out, since the C does not depend on
-    its folder. Keys added later (`emit.optimize`, `emit.compensation`,
-    `not_separable` and some in effects) appear only if they differ from the default, so that files without them keep
-    their hash.
+    its folder. Keys added later (`emit.optimize`, `emit.compensation`, `emit.converter`, `not_separable` and some in
+    effects) appear only if they differ from the default, so that files without them keep their hash.
     """
     data = _data(parameters)
     del data["emit"]["output"]
@@ -159,6 +158,8 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["compensation"]
     elif not parameters.emit.compensation.compensate:
         del data["emit"]["compensation"]["compensate"]
+    if parameters.emit.converter is None:
+        data["emit"].pop("converter", None)
     if not parameters.not_separable:
         del data["not_separable"]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

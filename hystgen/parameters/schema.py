@@ -265,6 +265,29 @@ class Compensation(_Part):
     _preview = field_validator("preview", mode="before")(_auto)
 
 
+MOST_BITS = 24
+"""[bits] Most bits of a converter: delta-sigma converters have 24, of which the last ones are noise."""
+
+
+class Converter(_Part):
+    """The codes of a converter: `range[0]` at the lowest code, `range[1]` at the highest one."""
+
+    bits: Annotated[int, Field(ge=2, le=MOST_BITS)] = Field(description="bits of a code", examples=[16])
+    range: tuple[Number, Number] = Field(
+        description="quantities at the lowest and at the highest code, input or output units", examples=[[-10.0, 110.0]]
+    )
+    coding: Literal["offset-binary", "twos-complement"] = Field(
+        description="codes from 0 on, or signed ones with 0 in the middle"
+    )
+
+
+class Converters(_Part):
+    """The converters through which references come in and drives go out."""
+
+    reference: Converter = Field(description="source of references: output units")
+    drive: Converter = Field(description="destination of drives: input units")
+
+
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
 
@@ -284,6 +307,9 @@ class EmitDefaults(_Part):
     )
     output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
     compensation: Compensation = Field(default=Compensation(), description="how the inverse compensates effects")
+    converter: Converters | None = Field(
+        default=None, description="converters of references and drives, for steps of the inverse from code to code"
+    )
 
 
 class Parameters(_Part):

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.compensator import reference
+from hystgen.compensator import converter, reference
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.converter import CodeConversion
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
@@ -59,6 +60,46 @@ def expected_records(
         following -= len(calls[1])
         found.append(expected_record(numbers, real, inverse, calls, following))
     return found
+
+
+@dataclass(frozen=True)
+class ExpectedCodes:
+    """Codes of converters, and the reference's results for them by name: conversions, codes sent, status bits."""
+
+    codes: NDArray[np.int32]
+    results: Mapping[str, NDArray[np.number]]
+
+
+def expected_codes(
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], conversion: CodeConversion, length: int
+) -> ExpectedCodes:
+    """Codes for both converters, some beyond their ends, with the results of the bit-exact reference."""
+    codes = signals.codes(conversion, length)
+    drives = conversion.drive_from_code(codes)
+    sent, status = converter.steps(numbers, conversion, codes)
+    found = {
+        "reference_from_code": conversion.reference_from_code(codes).astype(real),
+        "drive_from_code": drives.astype(real), "code_from_drive": conversion.code_from_drive(drives),
+        "step_code": sent, "status": status,
+    }
+    return ExpectedCodes(codes.astype(np.int32), found)
+
+
+def compare_codes(
+    run: Callable[[NDArray[np.int32]], Sequence[NDArray[np.number]]], expected: ExpectedCodes
+) -> Mismatch:
+    """Compare the compiled results for codes, bit for bit."""
+    different = 0
+    first, worst = "", 0.0
+    for found, (name, wanted) in zip(run(expected.codes), expected.results.items(), strict=True):
+        wanted = wanted.astype(found.dtype)
+        bits = np.dtype(f"u{found.itemsize}")
+        wrong = found.view(bits) != wanted.view(bits)
+        different += int(wrong.sum())
+        if wrong.any():
+            first = first or f"sample {int(np.argmax(wrong))} of {name}"
+            worst = max(worst, _ulps(found[wrong], wanted[wrong]))
+    return Mismatch(len(expected.codes), different, worst if np.isfinite(worst) else None, first)
 
 
 def _ulps(a: NDArray[np.number], b: NDArray[np.number]) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
-from hystgen.verification.comparison import Expected, compare
+from hystgen.verification.comparison import Expected, ExpectedCodes, compare, compare_codes
 from hystgen.verification.loading import LoadError, load
 from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
@@ -37,6 +37,8 @@ class _Library:
                 f"void hystgen_harness_{op}(const unsigned char *call, const {self._real} *x, {self._real} *answer,"
                 " unsigned char *status, size_t count);"
             )
+        if sources.coded:
+            self._ffi.cdef(f"void hystgen_harness_codes({', '.join(['void *'] * 6)}, size_t count);")
         self._lib = load(path, self._ffi.dlopen)
 
     def selftest(self) -> int:
@@ -57,6 +59,16 @@ class _Library:
         )
         return answer, status
 
+    def codes(self, x: NDArray[np.int32]) -> list[NDArray[np.number]]:
+        """The harness's results for codes `x`: references, drives, codes of these, codes sent, and status bits."""
+        real = next(dtype for dtype, name in C_TYPES.items() if name == self._real)
+        kinds = (real, real, np.dtype("int32"), np.dtype("int32"), np.dtype("uint8"))
+        found = [np.zeros(len(x), dtype=kind) for kind in kinds]
+        self._lib.hystgen_harness_codes(
+            *(self._ffi.cast("void *", each.ctypes.data) for each in (x, *found)), len(x)
+        )
+        return found
+
     def close(self) -> None:
         self._ffi.dlclose(self._lib)
 
@@ -68,8 +80,10 @@ def rows(
     compiler: Sequence[str],
     folder: Path,
     progress: Callable[[str], None],
+    codes: ExpectedCodes | None = None,
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build; compilers: the given ones, else all that are installed."""
+    """One row per operator, compiler and build, and one for `codes` of converters; compilers: the given ones, else all
+    that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
         yield failed(Row(HOST, "-", "-", "-"), compilers.none_found())
@@ -90,6 +104,8 @@ def rows(
             for op in sources.operators:
                 outcome = compare(functools.partial(library.run, op), records(op))
                 yield Row(HOST, name, build, op, **vars(outcome), ram=library.size(op))
+            if codes is not None:
+                yield Row(HOST, name, build, "codes", **vars(compare_codes(library.codes, codes)))
             row = selftest(Row(HOST, name, build, "selftest"), sources.name, library.selftest())
             library.close()
             if not row.ok:

@@ -14,9 +14,12 @@ from hystgen.emission.calls import emit_options, emitted_model
 from hystgen.model import ModelSource, as_model
 from hystgen.parameters.files import parameters_sha256
 from hystgen.verification import avr, cores, host, sources
-from hystgen.verification.comparison import Expected, expected_records
+from hystgen.verification.comparison import Expected, ExpectedCodes, expected_codes, expected_records
 from hystgen.verification.report import Report, Row
 from hystgen.verification.targets import AVR, HOST, Board, find
+
+CODES = 3_000
+"""[samples] Most steps from code to code; the reference takes about 0.1 ms for each."""
 
 
 @arguments.checked
@@ -70,6 +73,11 @@ def verify(
         progress(f"reference, {op}")
         return expected_records(numbers, real, op == "inverse", length)
 
+    @functools.cache
+    def codes() -> ExpectedCodes | None:
+        conversion = model.conversion(options.arithmetic, options.engine) if options.inverse else None
+        return None if conversion is None else expected_codes(numbers, real, conversion, min(length, CODES))
+
     with writing.temporary() as folder:
         written = sources.write(folder, model, options, parameters)
         sha256 = {"parameters": parameters, **written.sha256}
@@ -78,7 +86,8 @@ def verify(
             begun = time.perf_counter()
             if target is None:
                 wanted = functools.partial(records, length)
-                report.rows.extend(_timed(begun, host.rows(written, wanted, real, compiler, folder, progress)))
+                found = host.rows(written, wanted, real, compiler, folder, progress, codes())
+                report.rows.extend(_timed(begun, found))
             elif isinstance(target, Board):
                 memory = module.of(model, options).cost.avr
                 size = None if memory is None else avr.Size(model.cascade.pi.n, memory)

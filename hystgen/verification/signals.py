@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hystgen.compensator import reference
 from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.converter import CodeConversion
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
 from hystgen.plays import slots
@@ -112,6 +113,18 @@ def _onto_the_bends(
     outputs: NDArray[np.float64] = reference.answers(tables, False, _steps(drive), drive)[0].astype(float)
     outputs += least(outputs) * rng.integers(-8, 9, length)
     return outputs
+
+
+def codes(conversion: CodeConversion, length: int) -> NDArray[np.int64]:
+    """At most `length` codes for both converters, the same every time: their ends and beyond, sweeps, random ones."""
+    rng = np.random.default_rng(20261201)
+    lines, word = (conversion.reference, conversion.drive), np.iinfo(np.int32)
+    ends = [np.arange(end - 20, end + 21) for line in lines for end in (line.least, line.most)]
+    least, most = (float(end) for end in (conversion.reference.least, conversion.reference.most))
+    sweeps = least + (most - least) * _through(np.array([0.5, 1.0, 0.0, 0.8, 0.3, 0.6]), max(length // 2, 2))
+    drawn = [rng.integers(line.least, line.most, length, endpoint=True) for line in lines]
+    found: NDArray[np.int64] = np.rint(np.concatenate([[word.min, word.max], *ends, sweeps, *drawn])).astype(np.int64)
+    return found[:length]
 
 
 def suite(

@@ -31,6 +31,7 @@ class Sources:
     harness: Path
     selftest: Path | None = None  # code that is not emitted has none
     sha256: Mapping[str, str] = field(default_factory=dict)
+    coded: bool = False  # whether the inverse steps from code to code
 
     @property
     def emitted(self) -> tuple[Path, ...]:
@@ -48,12 +49,14 @@ def harness(
     operators: tuple[str, ...],
     more: Mapping[str, Sequence[str]] = MappingProxyType({}),
     arithmetic: Arithmetic = FLOAT32,
+    coded: bool = False,
 ) -> str:
-    """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator."""
+    """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator;
+    `coded`: whether the inverse steps from code to code."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
-        chain=chain,
+        chain=chain, coded=coded,
     )
 
 
@@ -82,11 +85,11 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     model's."""
     name = model.name
     emitted = module.of(model, options, parameters)
-    texts, calls = module.files(emitted), emitted.compensator.calls
+    texts, calls, coded = module.files(emitted), emitted.compensator.calls, emitted.compensator.variant.coded
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic])
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic], coded)
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256)
+    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded)
