@@ -12,6 +12,7 @@ import click
 
 from hystgen.basics import console
 from hystgen.cli import common
+from hystgen.emission.options import INTEGRATIONS
 
 if TYPE_CHECKING:
     from hystgen.model import Model
@@ -26,13 +27,17 @@ if TYPE_CHECKING:
 @common.optimize_option
 @common.layout_option
 @click.option(
-    "--check", is_flag=True, help="write nothing; exit 1 and list the C files that differ or that none of PARAMS writes"
+    "--integration", metavar="TOOL,..", help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS)
+)
+@click.option(
+    "--check", is_flag=True, help="write nothing; exit 1 and list the files that differ or that none of PARAMS writes"
 )
 @common.partial_option
 @common.effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
-    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: object
+    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool,
+    integration: str | None, **options: object,
 ) -> None:
     """Write the C files of models.
 
@@ -40,12 +45,17 @@ def emit(
 
     To keep all emitted files of a folder up to date: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --check
 
+    Ready for build tools: hystgen emit stage_x.yaml -o lib/ --integration platformio,cmake
+
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
-    from hystgen.basics import writing
+    from hystgen.basics import arguments
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
+    tools = options["integration"] = tuple(integration.split(",")) if integration is not None else ()
+    for tool in tools:
+        common.guarded(output, partial(arguments.choice, "integration", tool, INTEGRATIONS))
     models = common.for_each(params, partial(common.load_model, effects=effects))
     common.guarded(output, lambda: calls.check_names(models))
     named = list(zip(params, models, strict=True))
@@ -57,7 +67,7 @@ def emit(
         for name in made:
             console.say(str(Path(output) / name))
     else:
-        for path in common.guarded(output, lambda: writing.write_files(Path(output), made)):
+        for path in common.guarded(output, lambda: calls.write(Path(output), made)):
             console.say(str(path))
 
 
@@ -70,21 +80,27 @@ def _check(
     from hystgen.emission.options import OPTIONS
 
     folder = Path(output)
+    given = {
+        key: ",".join(value) if key == "integration" else value
+        for key, value in options.items() if value and (key, value) != ("layout", "self-contained")
+    }
     differing = []
     for (path, model), files in zip(models, texts, strict=True):
         found = common.guarded(path, partial(stale.find, folder, files))
         if not found:
             continue
-        partial_too = {"allow_partial": True} if options["allow_partial"] else {}
         chosen = calls.emit_options(model, **options)
-        wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
+        wanted = {key: getattr(chosen, key) for key in OPTIONS} | {
+            key: value for key, value in given.items() if key in ("allow_partial", "integration")
+        }
 
         def again(
             other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found
         ) -> list[stale.Difference]:
             try:
                 with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
-                    made = calls.emitted_files(model, **other, allow_partial=options["allow_partial"])
+                    unsealed = {key: options[key] for key in ("allow_partial", "integration")}
+                    made = calls.emitted_files(model, **other, **unsealed)
                     return stale.find(folder, made)
             except ValueError:  # the model no longer exists
                 return list(found)
@@ -95,5 +111,4 @@ def _check(
     if differing or unwritten:
         wrong = [*(each for one in differing for each in one.differences), *unwritten]
         problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
-        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hystgen.emission.options import read_banner
+from hystgen.emission.options import OPTIONS, read_banner
 
 LINE_ENDS = "has line endings other than LF"
 MISSING = "is missing"
@@ -73,15 +73,20 @@ def _words(options: Mapping[str, str], keys: list[str]) -> str:
 
 
 def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Difference]:
-    """C files in `folder` with a hystgen banner whose names are not among those `written` for all the `models`."""
+    """C files in `folder`, and files in its packages, with a hystgen banner whose names are not among those `written`
+    for all the `models`."""
+    from hystgen.emission import integration
+
     found = []
-    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
-        if path.suffix not in (".c", ".h") or path.name in written or not path.is_file():
+    own = [path for path in sorted(folder.iterdir()) if path.suffix in (".c", ".h")] if folder.is_dir() else []
+    for path in [*own, *integration.places(folder)] if folder.is_dir() else []:
+        name = path.relative_to(folder)
+        if name.as_posix() in written or not path.is_file():
             continue
         with contextlib.suppress(OSError):  # another user's file may be unreadable
             text = path.read_bytes().decode("utf-8", "surrogateescape").replace("\r\n", "\n")
             banner = read_banner(text.partition("*/")[0])
-            if banner is None:
+            if banner is None or (len(name.parts) > 1 and banner.model not in ("", name.parts[0])):
                 continue
             if not banner.model:
                 reason = "is a shared run time that none of the given models uses"
@@ -106,13 +111,12 @@ class Stale:
     @property
     def flags(self) -> dict[str, str | bool]:
         """The options that a banner does not contain."""
-        return {key: value for key, value in self.wanted.items() if value is True}
+        return {key: value for key, value in self.wanted.items() if key not in OPTIONS}
 
     @property
     def own(self) -> dict[str, str]:
         """The options in the banners, if they are readable and differ from the wanted ones."""
-        complete = len(self.wanted) - len(self.flags)
-        theirs = next((dict(each.options) for each in self.differences if len(each.options) == complete), {})
+        theirs = next((dict(each.options) for each in self.differences if len(each.options) == len(OPTIONS)), {})
         return {} if {**theirs, **self.flags} == self.wanted else theirs
 
 
@@ -146,7 +150,7 @@ def advice(
         asked = command([model.parameters for model in models], folder, given, effects)
         said.append(f"to {'replace them' if groups else 'write them again'}: {asked}{lost}")
     if unwritten:
-        paths = [os.path.join(folder, each.path.name) for each in unwritten]
+        paths = [os.path.join(folder, each.path.relative_to(Path(folder))) for each in unwritten]
         foreign = any("in any of" in each.reasons[0] for each in unwritten)
         which = ", or give their parameter files too" if foreign else ""
         said.append(f"to delete what no model writes: {shlex.join(['rm', *paths])}{which}")
