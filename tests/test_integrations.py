@@ -115,6 +115,8 @@ def emitted(request: pytest.FixtureRequest, models: list[Path], tmp_path_factory
 
 shared = pytest.mark.parametrize("emitted", ["shared-runtime"], indirect=True)
 """The layout with most packages, alone."""
+two_layouts = pytest.mark.parametrize("emitted", ["shared-runtime", "single-header"], indirect=True)
+"""The layouts whose sources are not those of the model alone."""
 
 
 def packages(folder: Path) -> list[Path]:
@@ -241,18 +243,18 @@ def test_list_outputs_check_and_orphans_cover_packages(
     everything = sorted(str(path) for path in folder.rglob("*") if path.is_file())
     assert sorted(run("emit", *models, "-o", folder, *tools, "--list-outputs")[1].splitlines()) == everything
     assert run("emit", *models, "-o", folder, *tools, "--check")[0] == 0
-    inside = [path for path in map(Path, everything) if path.parent != folder]
-    for path in inside:
-        good = path.read_bytes()
-        for bad, words in (
-            (good.replace(b"hystgen", b"hystGen"), "has no hystgen banner"), (good + b"\n", "was edited by hand"),
-            (good.replace(b"\n", b"\r\n"), "has line endings other than LF"), (None, "is missing"),
-        ):  # fmt: skip
-            path.unlink() if bad is None else path.write_bytes(bad)
-            found = hystgen.differences(models, folder, layout="shared-runtime", integration=INTEGRATIONS)
-            assert len(found) == 1
-            assert found[0].startswith(f"{path} ")
-            assert words in found[0]
+    inside = {path: path.read_bytes() for path in map(Path, everything) if path.parent != folder}
+    for change, words in (
+        (lambda good: good.replace(b"hystgen", b"hystGen"), "has no hystgen banner, so something else wrote it"),
+        (lambda good: good + b"\n", "was edited by hand"),
+        (lambda good: good.replace(b"\n", b"\r\n"), "has line endings other than LF"),
+        (None, "is missing"),
+    ):
+        for path, good in inside.items():
+            path.unlink() if change is None else path.write_bytes(change(good))
+        found = hystgen.differences(models, folder, layout="shared-runtime", integration=INTEGRATIONS)
+        assert sorted(found) == sorted(f"{path} {words}" for path in inside)
+        for path, good in inside.items():
             path.write_bytes(good)
     # Other parameters: every file of that model, in the C and in the package
     changed = tmp_path / "stage_x.yaml"
@@ -336,7 +338,7 @@ def test_cmake_builds_tests_installs_and_is_found(emitted: Path, tmp_path: Path)
         done([*CMAKE, "-S", package, "-B", build, f"-DCMAKE_INSTALL_PREFIX={prefix}"], tmp_path)
         done(["cmake", "--build", build], tmp_path)
         if package.name in NAMES:
-            assert "100% tests passed, 0 tests failed out of 1" in done(["ctest", "--test-dir", build], tmp_path)
+            done(["ctest", "--test-dir", build, "--no-tests=error"], tmp_path)
         done(["cmake", "--install", build], tmp_path)
     found = "\n".join(f"find_package({name} 0.1 CONFIG REQUIRED)" for name in NAMES)
     user_of_cmake(tmp_path / "installed", found, f"-DCMAKE_PREFIX_PATH={prefix}")
@@ -348,12 +350,13 @@ def test_ctest_fails_with_a_fault_in_the_package(emitted: Path, tmp_path: Path) 
     fault(tmp_path / "fw" / "stage_x" / "src" / "stage_x_selftest.c")
     done([*CMAKE, "-S", "fw/stage_x", "-B", "build"], tmp_path)
     done(["cmake", "--build", "build"], tmp_path)
-    assert "1 tests failed out of 1" in done(["ctest", "--test-dir", "build"], tmp_path, code=8)
+    assert "stage_x_selftest (Failed)" in done(["ctest", "--test-dir", "build"], tmp_path, code=8)
 
 
 # Meson -----------------------------------------------------------------------------------------------------
 
 
+@two_layouts
 def test_meson_builds_tests_and_installs(emitted: Path, tmp_path: Path) -> None:
     """As subprojects, which are emitted to the folder `subprojects`; installed, by pkg-config."""
     user = tmp_path / "user"
@@ -416,10 +419,10 @@ def platformio(tmp_path: Path) -> dict[str, object]:
     from platformio.dependencies import get_core_dependencies
 
     core = tmp_path / "core"
-    version = get_core_dependencies()["tool-scons"].lstrip("~^")
-    for path, text in {
-        **NATIVE, "packages/tool-scons/package.json": json.dumps({"name": "tool-scons", "version": version})
-    }.items():
+    scons = {"name": "tool-scons", "version": get_core_dependencies()["tool-scons"].lstrip("~^")}
+    origin = {"type": "tool", **scons, "spec": {"owner": "platformio", "name": "tool-scons"}}
+    named = {"package.json": json.dumps(scons), ".piopm": json.dumps(origin)}
+    for path, text in {**NATIVE, **{f"packages/tool-scons/{name}": text for name, text in named.items()}}.items():
         (core / path).parent.mkdir(parents=True, exist_ok=True)
         (core / path).write_text(text)
     return {
@@ -439,19 +442,23 @@ def test_platformio_finds_the_library_and_builds(
     (user / "src" / "main.c").write_text(MAIN)
     (user / "platformio.ini").write_text("[env:native]\nplatform = native\n")
     said = done(["pio", "run", "-e", "native"], user, **platformio)
-    for name in (*NAMES, "hystgen_runtime_f32"):
+    assert "Found 3 compatible libraries" in said
+    for name in NAMES:
         assert re.search(rf"-- {name} @ 0\.1\.0", said), said
     check_output(done([user / ".pio" / "build" / "native" / "program"], user))
 
 
+@shared
 def test_platformio_manifest_follows_its_schema(emitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tool("pio")
     from platformio.package.exception import ManifestValidationError
+    from platformio.package.manifest.parser import ManifestParserFactory
     from platformio.package.manifest.schema import ManifestSchema
 
-    monkeypatch.setattr(ManifestSchema, "load_spdx_licenses", staticmethod(lambda: {"licenses": [{"licenseId": "0BSD"}]}))
+    licences = {"licenses": [{"licenseId": "0BSD"}]}  # PlatformIO would download the list
+    monkeypatch.setattr(ManifestSchema, "load_spdx_licenses", staticmethod(lambda: licences))
     for package in packages(emitted):
-        manifest = json.loads((package / "library.json").read_text())
+        manifest = ManifestParserFactory.new_from_file(str(package / "library.json")).as_dict()
         assert ManifestSchema().load_manifest(manifest)["name"] == package.name
         with pytest.raises(ManifestValidationError):
             ManifestSchema().load_manifest({**manifest, "version": "first"})
@@ -466,23 +473,26 @@ HARDWARE = Path("/usr/share/arduino/hardware")
 def test_arduino_builds_the_example_which_runs_on_an_avr(emitted: Path, tmp_path: Path) -> None:
     """The example of the library on an emulated board, as a user starts it."""
     example = emitted / "stage_x" / "examples" / "stage_x_selftest"
+    # Debian's core for AVR does not compile with Debian's compiler, whose <float.h> hides DECIMAL_DIG in C++
     builder, simulator = tool("arduino-builder"), tool("simavr")
     (tmp_path / "build").mkdir()
     said = done([
-        builder, "-compile", "-hardware", HARDWARE, "-tools", HARDWARE / "tools" / "avr", "-libraries", emitted,
+        builder, "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", HARDWARE, "-tools", HARDWARE, "-libraries", emitted,
         "-fqbn", "arduino:avr:mega:cpu=atmega2560", "-build-path", tmp_path / "build", "-warnings", "all",
-        "-verbose", example / "stage_x_selftest.ino",
+        "-verbose", "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=9", example / "stage_x_selftest.ino",
     ], tmp_path)  # fmt: skip
     for name in ("stage_x", "hystgen_runtime_f32"):
         assert re.search(rf"Using library {name} at version 0\.1\.0", said), said
     with simulated(simulator, tmp_path / "build" / "stage_x_selftest.ino.elf") as lines:
-        assert next(line for line in lines if "stage_x_selftest" in line).strip(" .\n") == "stage_x_selftest: 0"
+        assert re.search(r"stage_x_selftest: 0\b", next(line for line in lines if "stage_x_selftest:" in line))
+    warnings = [line for line in said.splitlines() if "warning:" in line]
+    assert not [line for line in warnings if str(emitted) in line]
 
 
 @contextlib.contextmanager
 def simulated(simulator: str, program: Path) -> Iterator[Iterator[str]]:
     """What a program prints on the serial port of an emulated ATmega2560, for at most a minute."""
-    words = ["timeout", "60", simulator, "-m", "atmega2560", "-f", "16000000", str(program)]
+    words = ["timeout", "60", "stdbuf", "-oL", simulator, "-m", "atmega2560", "-f", "16000000", str(program)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout
         try:
@@ -562,7 +572,7 @@ mapping:
 """Schema of zephyr/module.yml, from Zephyr's documentation of modules."""
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # pykwalify's own
+@two_layouts
 def test_zephyr_module_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     tool("pykwalify")
     (tmp_path / "schema.yaml").write_text(MODULE)
@@ -594,6 +604,7 @@ def test_a_bad_kconfig_is_refused(tmp_path: Path) -> None:
         settings(tmp_path / "Kconfig")
 
 
+@shared
 def test_espidf_component_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     shutil.copytree(emitted, tmp_path / "components")
     done(["compote", "manifest", "lint", "components"], tmp_path, IDF_TOOLS_PATH=tmp_path)
