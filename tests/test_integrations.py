@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import shutil
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformio_native
 import pytest
 from ruamel.yaml import YAML
 
@@ -52,18 +52,18 @@ MAIN = """\
 #include <stage_y_selftest.h>
 
 int main(void) {
-    static const stage_x_real_t u[] = {%s};
+    static const stage_x_real_t u[] = {SAMPLES};
     static stage_x_inverse_t x;
     static stage_y_inverse_t y;
     unsigned i;
     stage_x_inverse_init(&x);
     stage_y_inverse_init(&y);
     for (i = 0; i < sizeof u / sizeof u[0]; ++i) {
-        printf("%%.9g %%.9g\\n", (double)stage_x_inverse_step(&x, u[i]), (double)stage_y_inverse_step(&y, u[i]));
+        printf("%.9g %.9g\\n", (double)stage_x_inverse_step(&x, u[i]), (double)stage_y_inverse_step(&y, u[i]));
     }
     return stage_x_selftest() + stage_y_selftest();
 }
-""" % ", ".join(f"{u}f" for u in U)
+""".replace("SAMPLES", ", ".join(f"{u}f" for u in U))
 """A user's program with both models."""
 
 
@@ -397,43 +397,16 @@ def test_conan_creates_packages_and_runs_their_tests(emitted: Path, tmp_path: Pa
 
 # PlatformIO ------------------------------------------------------------------------------------------------
 
-NATIVE = {
-    "platforms/native/platform.json": '{"name": "native", "version": "1.0.0", "title": "Native", "packages": {}}',
-    "platforms/native/platform.py": (
-        "from platformio.public import PlatformBase\n\n\nclass NativePlatform(PlatformBase):\n    pass\n"
-    ),
-    "platforms/native/builder/main.py": (
-        "from SCons.Script import AlwaysBuild, Default, DefaultEnvironment\n"
-        "env = DefaultEnvironment()\n"
-        "Default(AlwaysBuild(env.Alias('buildprog', env.BuildProgram(), env.VerboseAction('', ''))))\n"
-    ),
-    "packages/tool-scons/scons.py": "from SCons.Script import main\nmain()\n",
-}  # fmt: skip
-"""Stand-ins for the platform `native` and for the build tool, which PlatformIO would download."""
-
-
 @pytest.fixture
-def platformio(tmp_path: Path) -> dict[str, object]:
+def platformio(tmp_path: Path) -> dict[str, str]:
     """Settings with which PlatformIO downloads nothing."""
     tool("pio")
-    from platformio.dependencies import get_core_dependencies
-
-    core = tmp_path / "core"
-    scons = {"name": "tool-scons", "version": get_core_dependencies()["tool-scons"].lstrip("~^")}
-    origin = {"type": "tool", **scons, "spec": {"owner": "platformio", "name": "tool-scons"}}
-    named = {"package.json": json.dumps(scons), ".piopm": json.dumps(origin)}
-    for path, text in {**NATIVE, **{f"packages/tool-scons/{name}": text for name, text in named.items()}}.items():
-        (core / path).parent.mkdir(parents=True, exist_ok=True)
-        (core / path).write_text(text)
-    return {
-        "PLATFORMIO_CORE_DIR": core, "PLATFORMIO_SETTING_ENABLE_TELEMETRY": "no", "CI": "true",
-        "PLATFORMIO_SETTING_CHECK_PLATFORMIO_INTERVAL": 9999,
-    }
+    return platformio_native.settings(tmp_path / "core")
 
 
 @shared
 def test_platformio_finds_the_library_and_builds(
-    emitted: Path, tmp_path: Path, platformio: dict[str, object]
+    emitted: Path, tmp_path: Path, platformio: dict[str, str]
 ) -> None:
     """A project for `native` whose folder `lib` is the output folder."""
     user = tmp_path / "user"
@@ -477,9 +450,10 @@ def test_arduino_builds_the_example_which_runs_on_an_avr(emitted: Path, tmp_path
     builder, simulator = tool("arduino-builder"), tool("simavr")
     (tmp_path / "build").mkdir()
     said = done([
-        builder, "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", HARDWARE, "-tools", HARDWARE, "-libraries", emitted,
-        "-fqbn", "arduino:avr:mega:cpu=atmega2560", "-build-path", tmp_path / "build", "-warnings", "all",
-        "-verbose", "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=9", example / "stage_x_selftest.ino",
+        builder, "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", HARDWARE, "-tools", HARDWARE,
+        "-libraries", emitted, "-fqbn", "arduino:avr:mega:cpu=atmega2560", "-build-path", tmp_path / "build",
+        "-warnings", "all", "-verbose", "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=9",
+        example / "stage_x_selftest.ino",
     ], tmp_path)  # fmt: skip
     for name in ("stage_x", "hystgen_runtime_f32"):
         assert re.search(rf"Using library {name} at version 0\.1\.0", said), said

@@ -159,8 +159,8 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
     single-header; `allow_partial` leaves out effects that the C cannot include; `integration`: tools for which to write
-    a folder NAME/, among cmake, meson, conan, platformio, arduino, zephyr and espidf. Missing options come from the file.
-    Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
+    a folder NAME/, among cmake, meson, conan, platformio, arduino, zephyr and espidf. Missing options come from the
+    file. Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
     UnsupportedEffectsError, before anything is written; FileExistsError if a package would replace a file of another
     origin.
     """

@@ -32,7 +32,8 @@ FILES = {
         "library.properties": "library.properties.j2", "examples/NAME_selftest/NAME_selftest.ino": "selftest.ino.j2",
     },
     "zephyr": {
-        "zephyr/module.yml": "module.yml.j2", "zephyr/CMakeLists.txt": "zephyr.cmake.j2", "zephyr/Kconfig": "Kconfig.j2",
+        "zephyr/module.yml": "module.yml.j2", "zephyr/CMakeLists.txt": "zephyr.cmake.j2",
+        "zephyr/Kconfig": "Kconfig.j2",
     },
     "espidf": CONFIG | SELFTEST | {"idf_component.yml": "idf_component.yml.j2"},
 }
@@ -41,9 +42,9 @@ FILES = {
 WITH_SELFTEST = ("test/", "test_package/", "examples/")
 """Folders of a package that a shared run time, which has no self-test, does not get."""
 
-RESERVED = frozenset(
-    "all benchmark clean dist dl edit_cache gcc help install package package_source rebuild_cache rt test uninstall util"
-    .split()
+RESERVED = (
+    "all", "benchmark", "clean", "dist", "dl", "edit_cache", "gcc", "help", "install", "package", "package_source",
+    "rebuild_cache", "rt", "test", "uninstall", "util",
 )
 """Names of targets that the tools make themselves, and of libraries of the system, which a model's would hide."""
 
@@ -68,10 +69,13 @@ class Package:
 
 def name_problem(name: str) -> str | None:
     """Why there can be no package of a model with this name; None if there can."""
-    if len(name) == 1 or name.lower() in RESERVED:
-        reason = "conan wants two letters or more" if len(name) == 1 else "build tools or systems use that name themselves"
-        return f"no --integration for a model called {name}: {reason}; rename it, for example axis_{name}"
-    return None
+    if len(name) == 1:
+        reason = "conan requires two characters"
+    elif name.lower() in RESERVED:
+        reason = "build tools or systems use that name themselves"
+    else:
+        return None
+    return f"no --integration for a model called {name}: {reason}; rename it, for example axis_{name}"
 
 
 def files(module: Module, code: Mapping[str, str]) -> dict[str, str]:

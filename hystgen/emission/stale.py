@@ -133,8 +133,11 @@ def advice(
     found = [each for model in models for each in model.differences]
     lost = _lost(found)
     said = []
-    if any(LINE_ENDS in each.reasons for each in found):
-        said.append('git leaves line endings alone with "*.[ch] text eol=lf" in .gitattributes')
+    ends = [each.path.relative_to(folder) for each in found if LINE_ENDS in each.reasons]
+    if ends:
+        places = sorted({f"{path.parts[0]}/**" if len(path.parts) > 1 else "*.[ch]" for path in ends})
+        lines = " and ".join(f'"{place} text eol=lf"' for place in places)
+        said.append(f"git leaves line endings alone with {lines} in .gitattributes")
     groups: dict[tuple[bool, str], list[Stale]] = {}
     for model in models:
         if model.own:
@@ -150,7 +153,7 @@ def advice(
         asked = command([model.parameters for model in models], folder, given, effects)
         said.append(f"to {'replace them' if groups else 'write them again'}: {asked}{lost}")
     if unwritten:
-        paths = [os.path.join(folder, each.path.relative_to(Path(folder))) for each in unwritten]
+        paths = [os.path.join(folder, each.path.relative_to(folder)) for each in unwritten]
         foreign = any("in any of" in each.reasons[0] for each in unwritten)
         which = ", or give their parameter files too" if foreign else ""
         said.append(f"to delete what no model writes: {shlex.join(['rm', *paths])}{which}")
