@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -466,12 +467,15 @@ def test_arduino_builds_the_example_which_runs_on_an_avr(emitted: Path, tmp_path
 @contextlib.contextmanager
 def simulated(simulator: str, program: Path) -> Iterator[Iterator[str]]:
     """What a program prints on the serial port of an emulated ATmega2560, for at most a minute."""
-    words = ["timeout", "60", "stdbuf", "-oL", simulator, "-m", "atmega2560", "-f", "16000000", str(program)]
+    words = ["stdbuf", "-oL", simulator, "-m", "atmega2560", "-f", "16000000", str(program)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout
+        end = threading.Timer(60, process.kill)
+        end.start()
         try:
             yield iter(process.stdout)
         finally:
+            end.cancel()
             process.kill()
 
 
