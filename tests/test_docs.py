@@ -66,6 +66,7 @@ ELSEWHERE = {
     "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
     "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
         "test_session.py::test_the_command_of_the_plan_cuts_the_recording",
+    "conan profile detect --exist-ok": "test_integrations.py::test_conan_creates_packages_and_runs_their_tests",
     "conan create firmware/stage_x": "test_integrations.py::test_conan_creates_packages_and_runs_their_tests",
     "arduino-cli compile --fqbn arduino:avr:mega ~/Arduino/libraries/stage_x/examples/stage_x_selftest":
         "test_integrations.py::test_arduino_builds_the_example_which_runs_on_an_avr",

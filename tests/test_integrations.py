@@ -345,6 +345,7 @@ def test_cmake_builds_tests_installs_and_is_found(emitted: Path, tmp_path: Path)
     user_of_cmake(tmp_path / "installed", found, f"-DCMAKE_PREFIX_PATH={prefix}")
 
 
+@pytest.mark.thorough
 @shared
 def test_ctest_fails_with_a_fault_in_the_package(emitted: Path, tmp_path: Path) -> None:
     shutil.copytree(emitted, tmp_path / "fw")
@@ -384,11 +385,12 @@ def test_meson_builds_tests_and_installs(emitted: Path, tmp_path: Path) -> None:
 # Conan -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @shared
 def test_conan_creates_packages_and_runs_their_tests(emitted: Path, tmp_path: Path) -> None:
     home = {"CONAN_HOME": tmp_path / "home"}
     shutil.copytree(emitted, tmp_path / "fw")
-    done(["conan", "profile", "detect"], tmp_path, **home)
+    done(["conan", "profile", "detect", "--exist-ok"], tmp_path, **home)
     for name in ("hystgen_runtime_f32", "stage_x"):
         said = done(["conan", "create", f"fw/{name}", "-nr"], tmp_path, **home)
         assert ("Running test()" in said) == (name == "stage_x"), said
@@ -550,6 +552,7 @@ mapping:
 """Schema of zephyr/module.yml, from Zephyr's documentation of modules."""
 
 
+@pytest.mark.thorough
 @two_layouts
 def test_zephyr_module_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     tool("pykwalify")
@@ -582,6 +585,7 @@ def test_a_bad_kconfig_is_refused(tmp_path: Path) -> None:
         settings(tmp_path / "Kconfig")
 
 
+@pytest.mark.thorough
 @shared
 def test_espidf_component_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     shutil.copytree(emitted, tmp_path / "components")
