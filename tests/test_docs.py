@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformio_native
 import pytest
 from ruamel.yaml import YAML
 
@@ -67,8 +68,15 @@ ELSEWHERE = {
     "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
     "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
         "test_session.py::test_the_command_of_the_plan_cuts_the_recording",
+    "conan profile detect --exist-ok": "test_integrations.py::test_conan_creates_packages_and_runs_their_tests",
+    "conan create firmware/stage_x": "test_integrations.py::test_conan_creates_packages_and_runs_their_tests",
+    "arduino-cli compile --fqbn arduino:avr:mega ~/Arduino/libraries/stage_x/examples/stage_x_selftest":
+        "test_integrations.py::test_arduino_builds_the_example_which_runs_on_an_avr",
+    "west build -b nucleo_f446re -- -DZEPHYR_EXTRA_MODULES=$PWD/firmware/stage_x":
+        "test_integrations.py::test_zephyr_module_is_valid_and_builds",
+    "idf.py build": "test_integrations.py::test_espidf_component_is_valid_and_builds",
 }  # fmt: skip
-"""Commands that take too long here, and the tests that run them."""
+"""Commands that take too long here, or whose tool cannot be installed, and the tests of what they do."""
 
 
 # Blocks --------------------------------------------------------------------------------------------
@@ -285,6 +293,9 @@ def test_every_block_of_a_page_runs(name: str, start: Path, tmp_path: Path, monk
         (folder / "stage_x.yaml").unlink()
     if name == "docs/effects.md":
         add_droop(folder)
+    if name == "docs/howto/integrations.md":
+        for variable, value in platformio_native.settings(tmp_path / "platformio").items():
+            monkeypatch.setenv(variable, value)
     monkeypatch.chdir(folder)
     monkeypatch.setattr(verification, "verify", partial(bounded, verification.verify))
     page = Page(folder, {})

@@ -180,6 +180,11 @@ def check_files(folder: Path, names: Iterable[str]) -> None:
     for name in names:  # nothing else can stop a replacement half-way
         if (folder / name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
+        for inner in (folder / parent for parent in Path(name).parents[:-1]):
+            if inner.is_dir():
+                try_folder(inner, inner)
+            elif inner.exists() or inner.is_symlink():
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(inner))
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
@@ -198,6 +203,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
             made = staged / "made"
             made.mkdir()
             for name, content in files.items():
+                (made / name).parent.mkdir(parents=True, exist_ok=True)
                 (made / name).write_bytes(content if isinstance(content, bytes) else content.encode("ascii"))
             if new:
                 made.rename(target)
@@ -205,6 +211,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
                 check_files(target, files)
                 for name in files:
                     if not _same(made / name, target / name):
+                        (target / name).parent.mkdir(parents=True, exist_ok=True)
                         os.replace(made / name, target / name)
     except OSError as failure:
         own = not failure.filename or PREFIX in str(failure.filename)

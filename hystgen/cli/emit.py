@@ -15,6 +15,7 @@ import click
 
 from hystgen.basics import console
 from hystgen.cli import common
+from hystgen.emission.options import INTEGRATIONS
 
 if TYPE_CHECKING:
     from hystgen.emission import stale
@@ -45,7 +46,10 @@ class Emitted:
 @common.optimize_option
 @common.layout_option
 @click.option(
-    "--check", is_flag=True, help="write nothing; exit 1 and list the C files that differ or that none of PARAMS writes"
+    "--integration", metavar="TOOL,..", help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS)
+)
+@click.option(
+    "--check", is_flag=True, help="write nothing; exit 1 and list the files that differ or that none of PARAMS writes"
 )
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="with --check: write a JUnit XML report")
 @common.quiet_option
@@ -55,7 +59,7 @@ class Emitted:
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
-    list_outputs: bool, quiet: bool, **options: object,
+    list_outputs: bool, quiet: bool, integration: str | None, **options: object,
 ) -> None:
     """Write the C files of models.
 
@@ -63,9 +67,11 @@ def emit(
 
     To keep all emitted files of a folder up to date: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --check
 
+    Ready for build tools: hystgen emit stage_x.yaml -o lib/ --integration platformio,cmake
+
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
-    from hystgen.basics import writing
+    from hystgen.basics import arguments
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
@@ -74,6 +80,9 @@ def emit(
             raise common.Failed("error: --junit reports what --check finds; add --check", 2)
         common.keep_inputs([junit_file], params)
         common.guarded(junit_file, partial(writing.check_writable, junit_file))
+    tools = options["integration"] = tuple(integration.split(",")) if integration is not None else ()
+    for tool in tools:
+        common.guarded(output or ".", partial(arguments.choice, "integration", tool, INTEGRATIONS))
     models = common.for_each(params, partial(common.load_model, effects=effects))
     folders = [_folder(path, model, output) for path, model in zip(params, models, strict=True)]
     for folder in dict.fromkeys(folders):
@@ -95,7 +104,7 @@ def emit(
         files = {name: text for one in made if one.folder == folder for name, text in one.files.items()}
         if list_outputs:
             return [folder / name for name in files]
-        return common.guarded(str(folder), partial(writing.write_files, folder, files))
+        return common.guarded(str(folder), partial(calls.write, folder, files))
 
     for paths in common.for_each(list(dict.fromkeys(folders)), written):
         for path in paths if list_outputs or not quiet else ():
@@ -141,11 +150,14 @@ def _check(
     if differing or unwritten:
         wrong = [*(each for one in differing for each in one.differences), *unwritten]
         problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
-        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
+        given = {
+            key: ",".join(value) if key == "integration" else value
+            for key, value in options.items() if value and (key, value) != ("layout", "self-contained")
+        }
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
 
 
-UNSEALED = ("allow_partial", "manifest")
+UNSEALED = ("allow_partial", "manifest", "integration")
 """Options that a banner does not contain."""
 
 
@@ -164,5 +176,6 @@ def _stale(
         except ValueError:  # the model no longer exists
             return list(found)
 
-    wanted = {key: getattr(chosen, key) for key in OPTIONS} | dict(unsealed)
+    more = {key: ",".join(value) if key == "integration" else value for key, value in unsealed.items()}
+    wanted = {key: getattr(chosen, key) for key in OPTIONS} | more
     return stale.Stale(one.parameters, found, wanted, again)

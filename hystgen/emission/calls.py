@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +15,7 @@ from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
 from hystgen.effects import CATALOGUE, shapes
 from hystgen.emission import module
-from hystgen.emission.options import LAYOUTS, OPERATORS, Options
+from hystgen.emission.options import INTEGRATIONS, LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
 
@@ -38,11 +38,12 @@ def emit_options(
     optimize: str | None = None,
     allow_partial: bool = False,
     manifest: bool = False,
+    integration: Sequence[str] = (),
 ) -> Options:
     """The options to emit with: the arguments given, else the parameter file's `emit` section.
 
     `allow_partial`: effects that the C cannot include are left out, and named in its banner; `manifest`: whether to
-    write a manifest too.
+    write a manifest too; `integration`: the tools for which to write packages.
     """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
@@ -51,6 +52,9 @@ def emit_options(
     arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
+    tools = tuple(dict.fromkeys(arguments.words("integration", integration, "cmake")))
+    for tool in tools:
+        arguments.choice("integration", tool, INTEGRATIONS)
     left_out: tuple[str, ...] = ()
     if allow_partial and (refused := model.refusals(operator, arithmetic)):
         from hystgen.emission import worth
@@ -62,7 +66,7 @@ def emit_options(
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
     engine = model.engine(engine, operator, arithmetic, optimize)
-    return Options(operator, arithmetic, engine, layout, left_out, manifest)
+    return Options(operator, arithmetic, engine, layout, left_out, manifest, tools)
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
@@ -89,7 +93,7 @@ def emitted_model(model: Model, options: Options) -> Model:
 
 @arguments.taking(emit_options, "emit")
 def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
-    """Names and text of the C files for one or several models; options as for `emit`. Nothing is written.
+    """Names and text of the files for one or several models; options as for `emit`. Nothing is written.
 
     Raises the same errors as `emit`, and ValueError if two models make files with the same name.
     """
@@ -102,12 +106,16 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
         whole = module.of(kept, chosen, parameters_sha256(model.parameters))
         for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
-        files = module.files(whole)
+        code = module.files(whole)
+        made |= code
         if chosen.manifest:
             from hystgen.emission import manifest
 
-            files |= manifest.file(whole, files)
-        made |= files
+            made |= manifest.file(whole, code)
+        if chosen.integration:
+            from hystgen.emission import integration
+
+            made |= integration.files(whole, code)
     return made
 
 
@@ -156,11 +164,22 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
     single-header; `allow_partial` leaves out effects that the C cannot include; `manifest` writes NAME_manifest.json as
-    well. Missing options come from the file.
-    Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
-    UnsupportedEffectsError, before anything is written.
+    well; `integration`: tools for which to write a folder NAME/, among cmake, meson, conan, platformio, arduino, zephyr
+    and espidf. Missing options come from the file. Existing files with the same bytes are left alone. Raises
+    ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError, before anything is written;
+    FileExistsError if a package would replace a file of another origin.
     """
-    return writing.write_files(Path(arguments.path("output", output)), emitted_files(source, **options))
+    return write(Path(arguments.path("output", output)), emitted_files(source, **options))
+
+
+def write(folder: Path, files: Mapping[str, str]) -> list[Path]:
+    """Write emitted files (name to text) and return their paths. Raises FileExistsError, before anything is written, if
+    a package would replace a file of another origin."""
+    if any("/" in name for name in files):
+        from hystgen.emission import integration
+
+        integration.check_replaced(folder, files)
+    return writing.write_files(folder, files)
 
 
 @arguments.taking(emit_options, "emit")

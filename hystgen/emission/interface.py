@@ -60,6 +60,11 @@ def command(parameters: Parameters, options: Options) -> str:
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
+def runtime_origin(arithmetic: str) -> tuple[str, str]:
+    """For a shared run time: the command that emits it, and words for the hash of parameters."""
+    return f"hystgen emit PARAMS --arithmetic {arithmetic} --layout shared-runtime", "none, the same for all"
+
+
 def conditions(one: EmittedModel) -> tuple[str, str]:
     """The conditions for NAME_INVERSE_ROUNDING_ERROR in words, on branches and on memory; empty if there are none."""
     branch = "both take the same branch" if one.variant.branches else ""

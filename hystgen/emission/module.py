@@ -289,10 +289,10 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     """The run time that all models of one arithmetic share; the same bytes for every model."""
     family = runtime.FAMILIES[arithmetic]
     prefix, file = f"hystgen_{family.bits}", family.shared_file
-    command = f"hystgen emit PARAMS --arithmetic {arithmetic} --layout shared-runtime"
+    origin = interface.runtime_origin(arithmetic)
 
     def top(name: str, what: str) -> str:
-        return interface.banner(name, what, command, "none, the same for all")
+        return interface.banner(name, what, *origin)
 
     def whole(*names: str) -> str:
         return runtime.verbatim(names, file, family, prefix)

@@ -12,11 +12,13 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from hystgen.basics import junit
-from hystgen.emission.options import read_banner
+from hystgen.emission.options import OPTIONS, read_banner
 
 LINE_ENDS = "has line endings other than LF"
 MISSING = "is missing"
 EDITED = "was edited by hand"
+EMITTED = (".c", ".h", "_manifest.json")
+"""Endings of the names of emitted files."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,10 @@ def suite(
 
     `parameters`: the parameter file, whose parameters have the hash `sha256`; `files`: name to text.
     """
-    reasons = {each.path.name: each.sentence() for each in found}
+    reasons = {each.path: each.sentence() for each in found}
     cases = [
         junit.Case(
-            str(folder / file), 0.0 if k else seconds, reasons.get(file, ""),
+            str(folder / file), 0.0 if k else seconds, reasons.get(folder / file, ""),
             properties={"sha256": hashlib.sha256(text.encode("ascii")).hexdigest()},
         )
         for k, (file, text) in enumerate(files.items())
@@ -100,15 +102,20 @@ def _words(options: Mapping[str, str], keys: list[str]) -> str:
 
 
 def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Difference]:
-    """C files in `folder` with a hystgen banner whose names are not among those `written` for all the `models`."""
+    """C files and manifests in `folder`, and files in its packages, with a hystgen banner whose names are not among
+    those `written` for all the `models`."""
+    from hystgen.emission import integration
+
     found = []
-    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
-        if path.suffix not in (".c", ".h") or path.name in written or not path.is_file():
+    own = [path for path in sorted(folder.iterdir()) if path.name.endswith(EMITTED)] if folder.is_dir() else []
+    for path in [*own, *integration.places(folder)] if folder.is_dir() else []:
+        name = path.relative_to(folder)
+        if name.as_posix() in written or not path.is_file():
             continue
         with contextlib.suppress(OSError):  # another user's file may be unreadable
             text = path.read_bytes().decode("utf-8", "surrogateescape").replace("\r\n", "\n")
             banner = read_banner(text.partition("*/")[0])
-            if banner is None:
+            if banner is None or (len(name.parts) > 1 and banner.model not in ("", name.parts[0])):
                 continue
             if not banner.model:
                 reason = "is a shared run time that none of the given models uses"
@@ -133,13 +140,12 @@ class Stale:
     @property
     def flags(self) -> dict[str, str | bool]:
         """The options that a banner does not contain."""
-        return {key: value for key, value in self.wanted.items() if value is True}
+        return {key: value for key, value in self.wanted.items() if key not in OPTIONS}
 
     @property
     def own(self) -> dict[str, str]:
         """The options in the banners, if they are readable and differ from the wanted ones."""
-        complete = len(self.wanted) - len(self.flags)
-        theirs = next((dict(each.options) for each in self.differences if len(each.options) == complete), {})
+        theirs = next((dict(each.options) for each in self.differences if len(each.options) == len(OPTIONS)), {})
         return {} if {**theirs, **self.flags} == self.wanted else theirs
 
 
@@ -156,8 +162,11 @@ def advice(
     found = [each for model in models for each in model.differences]
     lost = _lost(found)
     said = []
-    if any(LINE_ENDS in each.reasons for each in found):
-        said.append('git leaves line endings alone with "*.[ch] text eol=lf" in .gitattributes')
+    ends = [each.path.relative_to(folder) for each in found if LINE_ENDS in each.reasons]
+    if ends:
+        places = sorted({f"{path.parts[0]}/**" if len(path.parts) > 1 else "*.[ch]" for path in ends})
+        lines = " and ".join(f'"{place} text eol=lf"' for place in places)
+        said.append(f"git leaves line endings alone with {lines} in .gitattributes")
     groups: dict[tuple[bool, str], list[Stale]] = {}
     for model in models:
         if model.own:
