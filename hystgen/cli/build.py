@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import click
 
 from hystgen.basics import console
@@ -31,7 +33,8 @@ def build(params: str, target: str | None, output: str, effects: tuple[str, ...]
 
     targets = tuple(target.split(",")) if target is not None else tuple(PLATFORMS)
     model = common.load_model(params, effects)
-    made = common.compiled(params, lambda: libraries.build(model, output, targets, progress=True, **options))
+    write = partial(libraries.build, model, output, targets, progress=True)
+    made = common.compiled(params, partial(write, **options))
     for path in made.paths:
         console.say(str(path))
     console.say("exported:")

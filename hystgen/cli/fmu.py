@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import click
 
 from hystgen.basics import console
@@ -30,5 +32,6 @@ def fmu(params: str, output: str, fmi: str, effects: tuple[str, ...], **options:
 
     model = common.load_model(params, effects)
     common.keep_inputs((output,), (params,))
-    path = common.compiled(params, lambda: units.fmu(model, output, int(fmi), progress=True, **options))
+    write = partial(units.fmu, model, output, int(fmi), progress=True)
+    path = common.compiled(params, partial(write, **options))
     console.say(str(path))

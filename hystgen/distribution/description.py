@@ -16,8 +16,12 @@ from hystgen.basics.version import __version__
 from hystgen.distribution.quantities import si
 from hystgen.model import Model
 
-INPUT, OUTPUT, STATUS, TEMPERATURE, PARAMETERS = 1, 2, 3, 4, 16
-"""Value references; 0 is the time, and the parameters begin at the last one. templates/fmu.c.j2 has the same."""
+INPUT = 1
+OUTPUT = 2
+STATUS = 3
+TEMPERATURE = 4
+PARAMETERS = 16
+"""Value references, as in `templates/fmu.c.j2`: 0 is the time, and the parameters begin at the last one."""
 
 SAMPLES = 1000
 """Samples of the experiment that a unit proposes; the length means nothing."""
@@ -63,8 +67,9 @@ class Description:
     @property
     def units(self) -> list[str]:
         """Units of all variables, sorted."""
-        signals = [self.given, self.answer, *([self.temperature] if self.temperature else [])]
-        return sorted({"s"} | {each.unit for each in (*signals, *self.parameters) if each.unit})
+        warm = {self.temperature.unit} if self.temperature else set[str]()
+        found = {self.given.unit, self.answer.unit, *warm, *(each.unit for each in self.parameters)}
+        return sorted({"s"} | found - {""})
 
 
 def parameters(model: Model) -> list[Parameter]:
@@ -125,14 +130,14 @@ def xml(one: Description) -> str:
         ("guid" if two else "instantiationToken"): one.token, "description": one.about, "version": "1",
         "license": "0BSD", "generationTool": f"hystgen {__version__}", "variableNamingConvention": "structured",
         **({"numberOfEventIndicators": "0"} if two else {}),
-    })  # fmt: skip
+    })
     step = _number(one.sample_time)
     state = "state" if two else "State"
     ElementTree.SubElement(root, "CoSimulation", {
         "modelIdentifier": one.model.name, f"canGetAndSetFMU{state}": "true", f"canSerializeFMU{state}": "true",
         "canHandleVariableCommunicationStepSize": "false",
         **({"canNotUseMemoryManagementFunctions": "true"} if two else {"fixedInternalStepSize": step}),
-    })  # fmt: skip
+    })
     _define_units(root, one.units)
     stop = _number(SAMPLES * one.sample_time)
     ElementTree.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": stop, "stepSize": step})
@@ -188,8 +193,6 @@ def _number(value: float) -> str:
 
 def _define_units(root: ElementTree.Element, units: Sequence[str]) -> None:
     """Units with their base units, where these are known."""
-    if not units:
-        return
     definitions = ElementTree.SubElement(root, "UnitDefinitions")
     for name in units:
         unit = ElementTree.SubElement(definitions, "Unit", {"name": name})

@@ -10,7 +10,6 @@ import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
@@ -18,9 +17,9 @@ from hystgen.basics.problems import ParameterError, Problem
 from hystgen.basics.progress import Progress
 from hystgen.distribution import description
 from hystgen.distribution.description import Description, Signal
-from hystgen.distribution.libraries import build_options, exports, linked
+from hystgen.distribution.libraries import LAYOUT, exports, linked
 from hystgen.distribution.platforms import PLATFORMS, Platform
-from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.emission.calls import emitted_files
 from hystgen.emission.runtime import template
 from hystgen.model import Model, ModelSource, as_model
 
@@ -32,21 +31,32 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 _FILE_MODE = 0o644 << 16
 
-_MAGIC, _ALIGNMENT = 0xCAFEBABE, 14
-"""A universal library for macOS: its first bytes, and the alignment of each library in it, a power of two."""
+_MAGIC = 0xCAFEBABE
+"""First bytes of a universal library for macOS."""
+
+_ALIGNMENT = 14
+"""Power of two at which each library in it starts: the pages of macOS on Arm."""
 
 
-@arguments.taking(build_options, "fmu")
+@arguments.checked
 def fmu(
-    source: ModelSource, output: str | os.PathLike[str], fmi: int = 2, progress: bool = False, **options: Any
+    source: ModelSource,
+    output: str | os.PathLike[str],
+    fmi: int = 2,
+    operator: str | None = None,
+    arithmetic: str | None = None,
+    engine: str | None = None,
+    optimize: str | None = None,
+    allow_partial: bool = False,
+    progress: bool = False,
 ) -> Path:
     """Write a model as a co-simulation unit, a file NAME.fmu, and return its path.
 
-    `fmi`: 2 or 3; `progress`: whether to show a bar on a terminal; options as for `emit`, without `layout`; `operator`
-    must be one. Variables: `u` and `v` for the inverse, `v` and `y` for the forward operator, in physical units, also in
-    fixed point; `status`; `temperature`, if an effect takes it; and the numbers of the parameter file. The step is the
-    file's `sample_time`. Raises what `emit` raises, ParameterError without a sample time, ValueError for both
-    operators, and CompileError if zig is missing or fails; nothing is written then.
+    `fmi`: 2 or 3; `operator`: inverse or forward; `progress`: whether to show a bar on a terminal; the other options
+    are those of `emit`. Variables: `u` and `v` for the inverse, `v` and `y` for the forward operator, in physical units
+    also in fixed point; `status`; `temperature`, if an effect takes it; and the numbers of the parameter file. The step
+    size is the file's `sample_time`. Raises what `emit` raises, ParameterError without a sample time, ValueError for
+    both operators, and CompileError if zig is missing or fails; nothing is written then.
     """
     path = Path(arguments.path("output", output))
     arguments.whole("fmi", fmi, "major versions", 0)
@@ -55,15 +65,18 @@ def fmu(
     if not model.parameters.sample_time:
         words = "missing, and a co-simulation unit needs it as its step size; add `sample_time: 1.0e-4`, in s"
         raise ParameterError(f"{model.name}.yaml", [Problem("sample_time", words)])
-    chosen = emit_options(model, **build_options(**options))
-    if chosen.operator == "both":
+    operator, arithmetic = operator or model.parameters.emit.operator, arithmetic or model.parameters.emit.arithmetic
+    if operator == "both":
         raise ValueError("a co-simulation unit has one operator; give --operator inverse or --operator forward")
-    texts = emitted_files(model, **build_options(**{**options, "operator": chosen.operator}))
+    texts = emitted_files(
+        model, operator=operator, arithmetic=arithmetic, engine=engine, optimize=optimize, allow_partial=allow_partial,
+        layout=LAYOUT,
+    )
     writing.check_writable(path)
-    one = _described(model, fmi, chosen.operator, texts[f"{model.name}.h"])
+    one = _described(model, fmi, operator, texts[f"{model.name}.h"])
     sources = {
         f"{model.name}.h": texts[f"{model.name}.h"], f"{model.name}.c": texts[f"{model.name}.c"],
-        "fmu.c": _code(one, chosen.operator, chosen.arithmetic),
+        "fmu.c": _code(one, operator, arithmetic),
         "library.c": template("library.c.j2", name=model.name, operators=()),
     }
     files: dict[str, bytes] = {"modelDescription.xml": description.xml(one).encode()}
@@ -113,15 +126,15 @@ def _token(fmi: int, header: str) -> str:
 
 def _code(one: Description, operator: str, arithmetic: str) -> str:
     """The C of a unit's interface."""
-    name, seconds = one.model.name, f"{one.sample_time:g}"
-    kind = ARITHMETICS[arithmetic]
+    name, kind = one.model.name, ARITHMETICS[arithmetic]
     sides = ("DRIVE", "OUTPUT") if operator == "forward" else ("OUTPUT", "DRIVE")
     return template(
         f"fmi{one.fmi}.c.j2", name=name, NAME=name.upper(), op=operator, fmi=one.fmi, token=one.token,
         temperature=one.temperature, parameters_from=description.PARAMETERS,
         temperature_start=repr(one.temperature.start) if one.temperature else "", input_start=repr(one.given.start),
         values=[repr(each.value) for each in one.parameters], sample_time=repr(one.sample_time),
-        wrong_step=f"doStep: the step of {name} is its sample time, {seconds} s; set the communication step size to it",
+        wrong_step=f"doStep: the step of {name} is its sample time, {one.sample_time:g} s; set the communication step "
+        "size to it",
         wrong_token=f"instantiate: the identifier is not that of {name}; unpack the unit again",
         fixed=arithmetic in FIXED, single=kind.c_type == "float", largest=2 ** (8 * kind.bytes - 1) - 1,
         input_side=sides[0], output_side=sides[1],

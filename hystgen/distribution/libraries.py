@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from hystgen.basics import arguments, writing
 from hystgen.basics.progress import Progress
@@ -24,17 +23,6 @@ LAYOUT = "self-contained"
 # Without debug information and symbols nothing depends on the folder in which zig runs. STRICT computes the bits of the
 # reference
 FLAGS = (*compilers.STRICT, "-g0", "-s", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
-
-
-def build_options(
-    operator: str | None = None, arithmetic: str | None = None, engine: str | None = None, optimize: str | None = None,
-    allow_partial: bool = False,
-) -> dict[str, Any]:
-    """The options of `emit` that choose the C in a binary."""
-    return {
-        "operator": operator, "arithmetic": arithmetic, "engine": engine, "optimize": optimize,
-        "allow_partial": allow_partial, "layout": LAYOUT,
-    }
 
 
 @dataclass(frozen=True)
@@ -81,25 +69,35 @@ def _operators(name: str, prototypes: Sequence[str]) -> list[str]:
     return [op for op in ("forward", "inverse") if f"{name}_{op}_init(" in words]
 
 
-@arguments.taking(build_options, "build")
+@arguments.checked
 def build(
-    source: ModelSource, output: str | os.PathLike[str] = ".", targets: Sequence[str] = tuple(PLATFORMS),
-    progress: bool = False, **options: Any,
+    source: ModelSource,
+    output: str | os.PathLike[str] = ".",
+    targets: Sequence[str] = tuple(PLATFORMS),
+    operator: str | None = None,
+    arithmetic: str | None = None,
+    engine: str | None = None,
+    optimize: str | None = None,
+    allow_partial: bool = False,
+    progress: bool = False,
 ) -> Library:
     """Compile the emitted C of a model into shared libraries, with zig, and write them to `output`/TARGET.
 
     Each folder gets NAME.so, .dll, .dylib or .wasm, and the header NAME.h. `targets`: names from
-    `hystgen.distribution.platforms`; `progress`: whether to show a bar on a terminal; options as for `emit`, without
-    `layout`. A library exports the functions of its header, and for each operator `size_t NAME_OP_size(void)`, the
-    bytes of an instance. It needs no C library. Raises what `emit` raises, ValueError for an unknown target, and
-    CompileError if zig is missing or fails; nothing is written then.
+    `hystgen.distribution.platforms`; `progress`: whether to show a bar on a terminal; the other options are those of
+    `emit`. A library exports the functions of its header, and for each operator `size_t NAME_OP_size(void)`, the bytes
+    of an instance. It needs no C library. Raises what `emit` raises, ValueError for an unknown target, and CompileError
+    if zig is missing or fails; nothing is written then.
     """
     folder = Path(arguments.path("output", output))
     chosen = [platforms.find(name) for name in dict.fromkeys(arguments.words("targets", targets, "x86_64-linux"))]
     if not chosen:
         raise ValueError(f"no target is given; use {', '.join(PLATFORMS)}")
     model = as_model(source)
-    texts = emitted_files(model, **build_options(**options))
+    texts = emitted_files(
+        model, operator=operator, arithmetic=arithmetic, engine=engine, optimize=optimize, allow_partial=allow_partial,
+        layout=LAYOUT,
+    )
     name, header = model.name, f"{model.name}.h"
     public = exports(name, texts[header])
     beside = template("library.c.j2", name=name, operators=_operators(name, public))
