@@ -7,9 +7,11 @@ and validates the units.
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import shutil
 import struct
+import subprocess
 import zipfile
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -713,6 +715,28 @@ def test_the_command_writes_the_unit(run: Run, tmp_path: Path, monkeypatch: pyte
     assert code == 2
     assert "nowhere does not exist" in err
     assert run("fmu", "plain.yaml", "-o", "x.fmu", "--fmi", "1")[0] == 2
+
+
+# MATLAB and Octave
+
+
+def test_the_gateway_for_octave_has_the_bits_of_the_reference(run: Run, tmp_path: Path) -> None:
+    """examples/mex: its script compares two instances with each other; its drives are compared here."""
+    if shutil.which("mkoctfile") is None:
+        pytest.skip("Debian's octave-dev is not installed; examples/mex/README.md says what was run by hand")
+    folder = tmp_path / "mex"
+    shutil.copytree(Path(__file__).parents[1] / "examples" / "mex", folder)
+    assert run("emit", folder / "stage_x.yaml", "-o", folder)[0] == 0
+    flags = {**os.environ, "CFLAGS": "-O2 -Wall -Wextra -Werror"}
+    done = subprocess.run(
+        ["octave", "--no-gui", "--quiet", "run_stage_x.m"], cwd=folder, env=flags, capture_output=True, text=True,
+        check=True,
+    )
+    assert "0 drives differ" in done.stdout
+    assert "status after a reference out of range: 1" in done.stdout
+    u, v = np.fromfile(folder / "drives.bin").reshape(2, -1)
+    wanted = hystgen.load(folder / "stage_x.yaml").inverse().simulate(u, arithmetic="float64")
+    assert v.tobytes() == np.asarray(wanted).tobytes()
 
 
 def test_the_message_of_a_failed_compiler_has_exit_code_2() -> None:
