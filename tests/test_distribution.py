@@ -457,6 +457,26 @@ def test_a_temperature_is_counted_from_zero_kelvin() -> None:
     assert (found.exponents, found.offset) == ({"K": 1}, Fraction("273.15"))
 
 
+@pytest.mark.parametrize("name", ["fmu", "Input"])
+def test_a_model_may_be_called_like_the_parts_of_a_binary(name: str, tmp_path: Path) -> None:
+    one = Model(parse_parameters(FILES["plain"].replace("name: plain", f"name: {name}") + SAMPLED, "plain.yaml"))
+    path = fmu(one, tmp_path / "named.fmu", 2 + len(name) % 2, operator="forward", arithmetic="float64")
+    assert validate_fmu(str(path)) == []
+    x = signal(one, "forward", 20)
+    wanted = expected(one, "forward", "float64", x)
+    assert simulated(path, "forward", x)["y"][1:].tolist() == wanted.tolist()
+    library = build(one, tmp_path, [HOST], operator="forward", arithmetic="float64").paths[0]
+    assert stepped(library, name, "forward", "double", x).tolist() == wanted.tolist()
+
+
+def test_many_plays_fit_every_stack(tmp_path: Path) -> None:
+    """An instance of 4096 plays takes 66 kB; Windows cannot link functions with more than a page of locals here."""
+    text = FILES["density"].replace("n: 40", "n: 4096") + SAMPLED
+    path = fmu(Model(parse_parameters(text, "density.yaml")), tmp_path / "large.fmu", operator="forward")
+    assert len(described(path)) > 8192
+    assert len(simulated(path, "forward", np.linspace(0.0, 10.0, 5))) == 6
+
+
 def test_units_with_odd_texts_are_valid(tmp_path: Path) -> None:
     """Whatever stands in the file must not break the XML."""
     text = FILES["plain"].replace("input: V, output: um", "input: '<\"counts\"&>', output: '\u00b5m'") + SAMPLED
@@ -689,7 +709,7 @@ def test_a_temperature_is_an_input_where_an_effect_takes_one(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(("text", "words", "message"), [
     (FILES["plain"], ["--operator", "inverse"],
-     "plain.yaml: error: sample_time: missing, and a co-simulation unit needs it as its step size; add "
+     "plain.yaml:1:1: error: sample_time: missing, and a co-simulation unit needs it as its step size; add "
      "`sample_time: 1.0e-4`, in s"),
     (FILES["plain"] + SAMPLED, ["--operator", "both"],
      "error: a co-simulation unit has one operator; give --operator inverse or --operator forward"),

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
-from hystgen.basics.problems import ParameterError, Problem
+from hystgen.basics.problems import FormatError
 from hystgen.basics.progress import Progress
 from hystgen.distribution import description
 from hystgen.distribution.description import Description, Signal
-from hystgen.distribution.libraries import LAYOUT, exports, linked
+from hystgen.distribution.libraries import LAYOUT, SUPPORT, exports, linked
 from hystgen.distribution.platforms import PLATFORMS, Platform
 from hystgen.emission.calls import emitted_files
 from hystgen.emission.runtime import template
@@ -55,8 +55,8 @@ def fmu(
     `fmi`: 2 or 3; `operator`: inverse or forward; `progress`: whether to show a bar on a terminal; the other options
     are those of `emit`. Variables: `u` and `v` for the inverse, `v` and `y` for the forward operator, in physical units
     also in fixed point; `status`; `temperature`, if an effect takes it; and the numbers of the parameter file. The step
-    size is the file's `sample_time`. Raises what `emit` raises, ParameterError without a sample time, ValueError for
-    both operators, and CompileError if zig is missing or fails; nothing is written then.
+    size is the file's `sample_time`. Raises what `emit` raises, FormatError without a sample time, ValueError for both
+    operators, and CompileError if zig is missing or fails; nothing is written then.
     """
     path = Path(arguments.path("output", output))
     arguments.whole("fmi", fmi, "major versions", 0)
@@ -64,7 +64,7 @@ def fmu(
     model = as_model(source)
     if not model.parameters.sample_time:
         words = "missing, and a co-simulation unit needs it as its step size; add `sample_time: 1.0e-4`, in s"
-        raise ParameterError(f"{model.name}.yaml", [Problem("sample_time", words)])
+        raise FormatError((("sample_time",), words))
     operator, arithmetic = operator or model.parameters.emit.operator, arithmetic or model.parameters.emit.arithmetic
     if operator == "both":
         raise ValueError("a co-simulation unit has one operator; give --operator inverse or --operator forward")
@@ -76,8 +76,8 @@ def fmu(
     one = _described(model, fmi, operator, texts[f"{model.name}.h"])
     sources = {
         f"{model.name}.h": texts[f"{model.name}.h"], f"{model.name}.c": texts[f"{model.name}.c"],
-        "fmu.c": _code(one, operator, arithmetic),
-        "library.c": template("library.c.j2", name=model.name, operators=()),
+        "co-simulation.c": _code(one, operator, arithmetic),
+        SUPPORT: template("library.c.j2", name=model.name, operators=()),
     }
     files: dict[str, bytes] = {"modelDescription.xml": description.xml(one).encode()}
     platforms = [each for each in PLATFORMS.values() if each.fmi3]

@@ -20,6 +20,9 @@ from hystgen.verification import compilers
 LAYOUT = "self-contained"
 """Layout of the C in a binary: all functions but the public ones are static, so only those are exported."""
 
+SUPPORT = "shared-library.c"
+"""File of the functions beside the emitted C; with a hyphen, it is not called like a model's."""
+
 # Without debug information and symbols nothing depends on the folder in which zig runs. STRICT computes the bits of the
 # reference
 FLAGS = (*compilers.STRICT, "-g0", "-s", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables")
@@ -101,7 +104,7 @@ def build(
     name, header = model.name, f"{model.name}.h"
     public = exports(name, texts[header])
     beside = template("library.c.j2", name=name, operators=_operators(name, public))
-    sources = {header: texts[header], f"{name}.c": texts[f"{name}.c"], "library.c": beside}
+    sources = {header: texts[header], f"{name}.c": texts[f"{name}.c"], SUPPORT: beside}
     calls = re.findall(rf"{name}_\w+(?=\()", "\n".join(public))
     made: dict[str, dict[str, str | bytes]] = {}
     for each in chosen:
