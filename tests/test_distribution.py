@@ -14,6 +14,7 @@ import struct
 import subprocess
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,17 @@ import cffi
 import fmpy
 import numpy as np
 import pytest
+import unicorn
 import wasmtime
 from elftools.elf.elffile import ELFFile
+from elftools.elf.relocation import RelocationSection
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from modelfiles import CHAINS, FILES
 from numpy.typing import NDArray
+from unicorn import arm64_const as arm64
+from unicorn import x86_const as x86
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS, FIXED
@@ -82,22 +87,53 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Library]:
     return folder, build(model("two_branches"), folder, operator="both")
 
 
+@dataclass(frozen=True)
+class DLL:
+    """A DLL for x86-64: its sections as address and content, the addresses of the functions that it exports, and of the
+    pointers that move with it."""
+
+    sections: dict[int, bytes]
+    exports: dict[str, int]
+    moved: list[int]
+
+
+def read_dll(data: bytes) -> DLL:
+    """A DLL from its headers, its export table and its table of base relocations."""
+
+    def word(place: int) -> int:
+        return int.from_bytes(data[place : place + 4], "little")
+
+    start = word(0x3C)
+    assert data[start : start + 6] == b"PE\0\0\x64\x86"
+    count, optional = struct.unpack_from("<H12xH", data, start + 6)
+    sections = {}
+    for k in range(count):
+        size, address, stored, raw = struct.unpack_from("<4I", data, start + 24 + optional + 40 * k + 8)
+        sections[address] = data[raw : raw + stored].ljust(size, b"\0")
+
+    def at(address: int, size: int) -> bytes:
+        begin = max(each for each in sections if each <= address)
+        return sections[begin][address - begin : address - begin + size]
+
+    tables = start + 24 + 112
+    names_count, functions, names, ordinals = struct.unpack("<4I", at(word(tables) + 24, 16))
+    exports = {}
+    for k in range(names_count):
+        name = at(int.from_bytes(at(names + 4 * k, 4), "little"), 64).split(b"\0", 1)[0].decode()
+        ordinal = int.from_bytes(at(ordinals + 2 * k, 2), "little")
+        exports[name] = int.from_bytes(at(functions + 4 * ordinal, 4), "little")
+    moved, place, end = [], word(tables + 40), word(tables + 40) + word(tables + 44)
+    while place < end:
+        page, size = struct.unpack("<2I", at(place, 8))
+        entries = struct.unpack(f"<{(size - 8) // 2}H", at(place + 8, size - 8))
+        moved += [page + (each & 0xFFF) for each in entries if each >> 12 == 10]
+        place += size
+    return DLL(sections, exports, moved)
+
+
 def names_of_pe(data: bytes) -> set[str]:
-    """Exported names of a DLL, from its export table."""
-    start = struct.unpack_from("<I", data, 0x3C)[0]
-    sections, optional = struct.unpack_from("<H", data, start + 6)[0], struct.unpack_from("<H", data, start + 20)[0]
-    table = struct.unpack_from("<I", data, start + 24 + 112)[0]
-
-    def at(address: int) -> int:
-        for k in range(sections):
-            size, virtual, _, raw = struct.unpack_from("<4I", data, start + 24 + optional + 40 * k + 8)
-            if virtual <= address < virtual + size:
-                return address - virtual + raw
-        raise AssertionError(address)
-
-    count, names = struct.unpack_from("<I", data, at(table) + 24)[0], struct.unpack_from("<I", data, at(table) + 32)[0]
-    found = (struct.unpack_from("<I", data, at(names) + 4 * k)[0] for k in range(count))
-    return {data[at(each) :].split(b"\0", 1)[0].decode() for each in found}
+    """Exported names of a DLL."""
+    return set(read_dll(data).exports)
 
 
 def commands_of_macho(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -177,10 +213,7 @@ def test_libraries_export_the_header_and_the_sizes_alone(built: tuple[Path, Libr
     assert names_said(library) == public
     assert names_of_elf(folder / HOST / "two_branches.so") == ("EM_X86_64", public, set())
     assert names_of_elf(folder / "aarch64-linux" / "two_branches.so") == ("EM_AARCH64", public, set())
-    dll = (folder / "x86_64-windows" / "two_branches.dll").read_bytes()
-    start = struct.unpack_from("<I", dll, 0x3C)[0]
-    assert dll[start : start + 6] == b"PE\0\0\x64\x86"
-    assert names_of_pe(dll) == public
+    assert names_of_pe((folder / "x86_64-windows" / "two_branches.dll").read_bytes()) == public
     for target, processor in (("x86_64-macos", 0x0100_0007), ("aarch64-macos", 0x0100_000C)):
         dylib = (folder / target / "two_branches.dylib").read_bytes()
         assert struct.unpack_from("<II", dylib) == (0xFEED_FACF, processor)
@@ -241,6 +274,77 @@ def test_webassembly_has_the_bits_of_the_reference(operator: str, built: tuple[P
     assert found.tobytes() == expected(one, operator, "float32", x).astype(np.float32).tobytes()
 
 
+@pytest.mark.parametrize("operator", ["inverse", "forward"])
+def test_linux_on_arm_has_the_bits_of_the_reference(operator: str, built: tuple[Path, Library]) -> None:
+    """The library in an emulated core, whose fused multiply-adds nothing may use: its segments, with the addresses that
+    a loader would fill in."""
+    core, base = unicorn.Uc(unicorn.UC_ARCH_ARM64, unicorn.UC_MODE_ARM), 0x10_0000
+    core.reg_write(arm64.UC_ARM64_REG_CPACR_EL1, 3 << 20)  # floating point on
+    core.mem_map(base, 0x10_0000)
+    with (built[0] / "aarch64-linux" / "two_branches.so").open("rb") as file:
+        elf = ELFFile(file)
+        for segment in elf.iter_segments("PT_LOAD"):
+            core.mem_write(base + segment["p_vaddr"], segment.data())
+        symbols = elf.get_section_by_name(".dynsym")
+        for section in elf.iter_sections():
+            for each in section.iter_relocations() if isinstance(section, RelocationSection) else ():
+                symbol = symbols.get_symbol(each["r_info_sym"])["st_value"]
+                assert each["r_info_type"] in (1025, 1026, 1027)  # GLOB_DAT, JUMP_SLOT, RELATIVE
+                core.mem_write(base + each["r_offset"], struct.pack("<Q", base + symbol + each["r_addend"]))
+        place = {each.name: base + each["st_value"] for each in symbols.iter_symbols()}
+    axis, stack, back = base + 0x8_0000, base + 0xF_0000, base + 0xF_8000
+
+    def call(name: str) -> None:
+        core.reg_write(arm64.UC_ARM64_REG_X0, axis)
+        core.reg_write(arm64.UC_ARM64_REG_SP, stack)
+        core.reg_write(arm64.UC_ARM64_REG_LR, back)
+        core.emu_start(place[f"two_branches_{operator}_{name}"], back)
+
+    def step(x: float) -> float:
+        core.reg_write(arm64.UC_ARM64_REG_S0, struct.unpack("<I", struct.pack("<f", x))[0])
+        call("step")
+        return float(struct.unpack("<f", struct.pack("<I", core.reg_read(arm64.UC_ARM64_REG_S0)))[0])
+
+    call("init")
+    one = model("two_branches")
+    x = signal(one, operator, 1000).astype(np.float32)
+    found = np.array([step(each) for each in x.tolist()], dtype=np.float32)
+    assert found.tobytes() == expected(one, operator, "float32", x).astype(np.float32).tobytes()
+
+
+@pytest.mark.parametrize("operator", ["inverse", "forward"])
+def test_windows_has_the_bits_of_the_reference(operator: str, built: tuple[Path, Library]) -> None:
+    """The DLL in an emulated core, called as Windows calls; nothing but the DLL is there."""
+    core, base = unicorn.Uc(unicorn.UC_ARCH_X86, unicorn.UC_MODE_64), 0x10_0000
+    core.mem_map(base, 0x10_0000)
+    data = (built[0] / "x86_64-windows" / "two_branches.dll").read_bytes()
+    dll = read_dll(data)
+    for address, content in dll.sections.items():
+        core.mem_write(base + address, content)
+    preferred = struct.unpack_from("<Q", data, struct.unpack_from("<I", data, 0x3C)[0] + 24 + 24)[0]
+    for address in dll.moved:
+        (pointer,) = struct.unpack("<Q", core.mem_read(base + address, 8))
+        core.mem_write(base + address, struct.pack("<Q", pointer - preferred + base))
+    axis, stack, back = base + 0x8_0000, base + 0xF_0000, base + 0xF_8000
+
+    def call(name: str) -> None:
+        core.reg_write(x86.UC_X86_REG_RCX, axis)
+        core.reg_write(x86.UC_X86_REG_RSP, stack - 8)
+        core.mem_write(stack - 8, struct.pack("<Q", back))
+        core.emu_start(base + dll.exports[f"two_branches_{operator}_{name}"], back)
+
+    def step(x: float) -> float:
+        core.reg_write(x86.UC_X86_REG_XMM1, struct.unpack("<I", struct.pack("<f", x))[0])
+        call("step")
+        return float(struct.unpack("<f", struct.pack("<I", core.reg_read(x86.UC_X86_REG_XMM0) & 0xFFFF_FFFF))[0])
+
+    call("init")
+    one = model("two_branches")
+    x = signal(one, operator, 1000).astype(np.float32)
+    found = np.array([step(each) for each in x.tolist()], dtype=np.float32)
+    assert found.tobytes() == expected(one, operator, "float32", x).astype(np.float32).tobytes()
+
+
 @pytest.mark.parametrize(("name", "arithmetic"), [("bent", "q15"), ("curved", "q31"), ("mixed", "float64")])
 def test_options_of_emit_apply(name: str, arithmetic: str, tmp_path: Path) -> None:
     one, kind = model(name), ARITHMETICS[arithmetic]
@@ -259,6 +363,7 @@ def header_number(header: str, macro: str) -> float:
     return float(re.findall(rf"#define {macro} (\S+)", header)[0])
 
 
+@pytest.mark.thorough
 def test_the_same_model_gives_the_same_bytes_in_any_folder(
     built: tuple[Path, Library], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -469,6 +574,7 @@ def test_a_model_may_be_called_like_the_parts_of_a_binary(name: str, tmp_path: P
     assert stepped(library, name, "forward", "double", x).tolist() == wanted.tolist()
 
 
+@pytest.mark.thorough
 def test_many_plays_fit_every_stack(tmp_path: Path) -> None:
     """An instance of 4096 plays takes 66 kB; Windows cannot link functions with more than a page of locals here."""
     text = FILES["density"].replace("n: 40", "n: 4096") + SAMPLED
