@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from hystgen.cascade import Cascade as Cascade
     from hystgen.cascade import InverseCascade as InverseCascade
     from hystgen.compensator.reference import Session as Session
+    from hystgen.distribution.fmu import fmu as fmu
+    from hystgen.distribution.libraries import build as build
     from hystgen.emission.calls import differences as differences
     from hystgen.emission.calls import emit as emit
     from hystgen.fleet.batch import identify_batch as identify_batch
@@ -53,6 +55,8 @@ _NAMES = {
     "basics.problems": ("FormatError", "NotInvertibleError", "ParameterError", "SampleWarning"),
     "cascade": ("Cascade", "InverseCascade", "PI"),
     "compensator.reference": ("Session",),
+    "distribution.fmu": ("fmu",),
+    "distribution.libraries": ("build",),
     "emission.calls": ("differences", "emit"),
     "fleet.batch": ("identify_batch",),
     "front.dead_zone.model": ("DeadZone",),

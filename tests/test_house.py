@@ -36,6 +36,7 @@ ROOMS = (
     "simulation",
     "emission",
     "verification",
+    "distribution",
     "closed_loop",
     "identification",
     "tracking",
@@ -194,7 +195,7 @@ def test_dir_and_help_list_the_public_names() -> None:
         assert name in page
 
 
-@pytest.mark.parametrize("name", ["emit", "verify", "identify", "diagnose", "plan", "differences"])
+@pytest.mark.parametrize("name", ["emit", "verify", "build", "fmu", "identify", "diagnose", "plan", "differences"])
 def test_signatures_are_real(name: str) -> None:
     """Every option is in the signature with its default, and none is hidden in `**options`."""
     parameters = inspect.signature(getattr(hystgen, name)).parameters.values()

@@ -121,7 +121,7 @@ class NotInvertibleError(ValueError):
 
 
 class FormatError(ValueError):
-    """The parameters of a model do not fit the arithmetic.
+    """The parameters of a model do not fit the arithmetic, or another use of its C.
 
     `problems`: pairs of a path in the parameter file, or `()`, and what is wrong there; `str()` gives one line each.
     """

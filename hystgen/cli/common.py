@@ -83,6 +83,16 @@ def guarded(path: str, action: Callable[[], T]) -> T:
         raise Failed(f"error: {_reason(error)}", 2) from None
 
 
+def compiled(path: str, action: Callable[[], T]) -> T:
+    """`guarded`, for an action that starts a compiler: one that is missing or fails is exit code 2 as well."""
+    from hystgen.verification.compilers import CompileError
+
+    try:
+        return guarded(path, action)
+    except CompileError as error:
+        raise Failed(f"error: {error}", 2) from None
+
+
 def _reason(error: Exception) -> str:
     """The text of an error; for operating system errors the file, the reason and advice."""
     if not isinstance(error, OSError) or not error.strerror:
