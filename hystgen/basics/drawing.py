@@ -183,12 +183,12 @@ def legend_above(axes: Axes, columns: int = 3) -> None:
     )
 
 
-def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
+def kept(start: int, stop: int, *signals: Array, blocks: int = BLOCKS) -> NDArray[np.intp]:
     """Indices from start to stop that suffice to draw the same lines: each block's extremes of every signal."""
     count = stop - start
-    if count <= 4 * BLOCKS:
+    if count <= 4 * blocks:
         return np.arange(start, stop)
-    edges = np.linspace(0, count, BLOCKS + 1).astype(int)
+    edges = np.linspace(0, count, blocks + 1).astype(int)
     found = [np.array([0, count - 1])]
     for signal in signals:
         part = signal[start:stop]

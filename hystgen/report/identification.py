@@ -26,6 +26,7 @@ from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
+from hystgen.report.viewer import Viewed, Viewer
 
 PAGE = "report.html"
 
@@ -175,6 +176,7 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> 
         Section("How good it is", _table(fit)),
         Section("Loops", [figures["loop"]]),
         Section("Over time", [figures["time"]]),
+        Section("Zoom and read values", _zoom(fit, shown)),
         Section("The residual, and what it depends on", [figures["residual"]]),
         Section("Initial loading curve", [figures["loading"]]),
         Section("Thresholds and weights", [figures["weights"]]),
@@ -185,6 +187,18 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> 
         Section("Parameters", [yaml]),
         Section("Provenance", _provenance(fit, shown)),
     ]
+
+
+def _zoom(fit: Fit, shown: Sequence[Shown]) -> list[Viewer]:
+    units = fit.parameters.units
+    viewed = [
+        Viewed(
+            each.record.name, fit_figures.role(each), each.time, each.drive, each.measured,
+            {"model": np.where(each.used.compared, each.model, np.nan)},
+        )
+        for each in sorted(shown, key=lambda each: not each.used.held_out)
+    ]
+    return [Viewer(viewed, (units.input, units.output), fit_figures.noise_of(fit_figures.judged(shown)))]
 
 
 def _table(fit: Fit) -> list[Text | HtmlTable | Listing]:
