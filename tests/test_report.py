@@ -40,7 +40,7 @@ WEIGHTS = (0.6, 0.1, 0.1, 0.08, 0.06, 0.05)
 NOISE = 0.09
 UNITS = {"v": "V", "y": "um"}
 FILES = {"report.html"} | {
-    f"{name}.{kind}" for name in ("loop", "time", "residual", "loading", "weights") for kind in ("svg", "png")
+    f"{name}.{kind}" for name in ("loop", "time", "residual", "spectrum", "loading", "weights") for kind in ("svg", "png")
 }
 
 OUTLIERS, SPIKES = (415, 777, 1013, 2105, 2106), (610, 1910, 1911)

@@ -175,6 +175,21 @@ def noise_lines(axes: Axes, noise: float | None) -> None:
         axes.axhline(side, color=FAULT, linewidth=1.0, linestyle="--", label=name)
 
 
+def decades(axes: Axes, which: str, limits: tuple[float, float] | None = None) -> None:
+    """Make an axis logarithmic, with few plain numbers; `limits`: its ends, those of what is drawn if not given."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axes.set(**{f"{which}scale": "log"})
+    if limits is not None:
+        axes.set(**{f"{which}lim": limits})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    subs = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
 def legend_above(axes: Axes, columns: int = 3) -> None:
     """Place the legend above the plot area, where it hides nothing."""
     axes.legend(

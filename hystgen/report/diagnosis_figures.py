@@ -87,7 +87,7 @@ def gap(found: Diagnosis, width: float) -> Figure:
     axes.set_ylim(len(names) - 0.5, -0.5)
     room = 1.4 if width == WIDE else 2.0
     if far:
-        _decades(axes, "x")
+        drawing.decades(axes, "x")
         axes.set_xlim(least, top * (top / least) ** (0.22 if width == WIDE else 0.6))
     else:
         axes.set_xlim(0.0, room * top)
@@ -195,7 +195,7 @@ def _binned(axes: Axes, x: Array, e: Array, colour: str, what: str, log: bool) -
     axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.25, linewidth=0)
     axes.plot(middle, mean, color=colour, linewidth=1.5, label=what)
     if log:
-        _decades(axes, "x")
+        drawing.decades(axes, "x")
 
 
 def _since_stop(each: Signals) -> Array:
@@ -267,8 +267,8 @@ def frequency(found: Diagnosis, width: float) -> Figure:
             axes.axvline(line.frequency, color=drawing.OTHER, linestyle=":", linewidth=1.0)
             axes.annotate(f"{line.frequency:.4g} Hz", (line.frequency, 1.0), xycoords=("data", "axes fraction"),
                           xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)
-    _decades(axes, "x")
-    _decades(axes, "y")
+    drawing.decades(axes, "x")
+    drawing.decades(axes, "y")
     axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
     axes.set_title(each.name, pad=8 if width == WIDE else 22)
     drawing.legend_above(axes, 3 if width == WIDE else 2)
@@ -285,24 +285,11 @@ def _range(axes: Axes, values: Sequence[float], which: str) -> None:
     """An axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
-        _decades(axes, which)
+        drawing.decades(axes, which)
     elif which == "x":
         axes.set_xlim(left=0.0)
     else:
         axes.set_ylim(bottom=0.0)
-
-
-def _decades(axes: Axes, which: str) -> None:
-    """A logarithmic axis with few plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    axes.set(**{f"{which}scale": "log"})
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
-    subs = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(NullLocator())
 
 
 def _rms(e: Array) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import drawing
+from hystgen.report.panels import straight_line
 
 Array = NDArray[np.float64]
 
@@ -105,17 +106,6 @@ def script() -> str:
 def script_hash() -> str:
     """The script's hash, as a content security policy gives it."""
     return "sha256-" + base64.b64encode(hashlib.sha256(script().encode("utf-8")).digest()).decode("ascii")
-
-
-def straight_line(x: Array, y: Array) -> tuple[float, float]:
-    """Offset and slope of the straight line through y over x by least squares; NaN are left out."""
-    known = np.isfinite(x) & np.isfinite(y)
-    if np.count_nonzero(known) < 2 or np.ptp(x[known]) == 0.0:
-        return (float(np.mean(y[known])) if known.any() else 0.0), 0.0
-    x, y = x[known], y[known]
-    middle = float(np.mean(x))
-    slope = float(np.dot(x - middle, y) / np.dot(x - middle, x - middle))
-    return float(np.mean(y)) - slope * middle, slope
 
 
 def _packed(record: Viewed, most: int) -> dict[str, object]:
