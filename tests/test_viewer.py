@@ -1,4 +1,4 @@
-"""The part of a page that zooms: its samples are those of the records, and a browser reads them by keyboard and touch."""
+"""The part of a page that zooms: a browser reads the values of the records, by keyboard and touch."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import html
 import json
 import re
 import subprocess
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -205,8 +204,8 @@ def seen(made_page: str, chromium: str, tmp_path_factory: pytest.TempPathFactory
     )
     command = [
         chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
-        "--hide-scrollbars", "--enable-logging=stderr", f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=20000",
-        "--dump-dom", (folder / "frames.html").as_uri(),
+        "--hide-scrollbars", "--enable-logging=stderr", f"--user-data-dir={folder / 'profile'}",
+        "--virtual-time-budget=20000", "--dump-dom", (folder / "frames.html").as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
     (shown,) = re.findall(r"<pre>(\{.*?\})</pre>", done.stdout, re.DOTALL)
@@ -224,7 +223,8 @@ def test_keyboard_and_touch_read_the_values_of_the_record(
     assert focus[:3] == [True, 0, "application"]
     assert "plus and minus: zoom" in focus[3]
     record = RECORDS[0]
-    model, steps = record.models["model"], 1e-6 * np.array([np.ptp(record.v), np.nanmax(record.y) - np.nanmin(record.y)])
+    model = record.models["model"]
+    steps = 1e-6 * np.array([np.ptp(record.v), np.nanmax(record.y) - np.nanmin(record.y)])
 
     def index(text: str) -> int:
         k = round(value(text, "time") / 1e-3)

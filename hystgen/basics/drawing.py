@@ -29,7 +29,9 @@ Array = NDArray[np.float64]
 MEASURED, MODEL, RESIDUAL, OTHER = "#1f5a99", "#c2410c", "#3f7d3a", "#5b4a91"
 IGNORED, GAP, FAULT, QUIET = "#8a929c", "#e0a526", "#b01030", "#6b7280"
 
-LINES: dict[str, dict[str, Any]] = {
+Style = dict[str, Any]
+
+LINES: dict[str, Style] = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }

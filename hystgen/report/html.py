@@ -86,9 +86,13 @@ def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
     template = runtime.environment().overlay(autoescape=True).get_template("report.html.j2")
     zooms = any(isinstance(block, Viewer) for section in sections for block in section.blocks)
     return template.render(
-        title=title, lead=lead, sections=sections, data_uri=_data_uri,
-        script=Markup(viewer.script()) if zooms else "", script_hash=viewer.script_hash(),
-    )  # fmt: skip
+        title=title,
+        lead=lead,
+        sections=sections,
+        data_uri=_data_uri,
+        script=Markup(viewer.script()) if zooms else "",
+        script_hash=viewer.script_hash(),
+    )
 
 
 def _data_uri(svg: bytes) -> Markup:

@@ -348,7 +348,7 @@ def _loop_alt(fit: Fit, shown: Sequence[Shown]) -> str:
 
 def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
     said = []
-    drawn = {}
+    drawn: list[str] = []
     for each in fit_figures.drawn_ones(shown):
         skipped, ignored, outliers, stretches, bridged, gaps, left_out = map(len, _masks(each))
         counts = [
@@ -359,20 +359,20 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
         ]
         counts += [counted(stretches, "sample") + " in faulty stretches"] if stretches else []
         counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
-        drawn |= {"grey: not compared": 1} if skipped + ignored + stretches + left_out else {}
-        drawn |= {"yellow: gaps": 1} if gaps else {}
-        drawn |= {"crosses: outliers": 1} if outliers else {}
-        drawn |= {"triangles: bridged drive samples": 1} if bridged else {}
+        drawn += ["grey: not compared"] if skipped + ignored + stretches + left_out else []
+        drawn += ["yellow: gaps"] if gaps else []
+        drawn += ["crosses: outliers"] if outliers else []
+        drawn += ["triangles: bridged drive samples"] if bridged else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
-        "Measured and model over time; below, measured minus model where samples were compared; below that, the stretch "
+        "Measured and model over time; below, measured minus model where samples were compared, then the stretch "
         "with the largest error, shaded, with as much before and behind it, less the record's straight line"
-        f"{''.join(f'; {each}' for each in drawn)}. {'; '.join(said)}.{_several(shown)}"
+        f"{''.join(f'; {each}' for each in dict.fromkeys(drawn))}. {'; '.join(said)}.{_several(shown)}"
     )
 
 
 def _time_alt(fit: Fit, shown: Sequence[Shown]) -> str:
-    return f"Displacement over time, measured and model, with the residual and the worst stretch below: {_errors(shown, fit)}"
+    return f"Displacement over time, measured and model, residual and worst stretch: {_errors(shown, fit)}"
 
 
 def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:

@@ -72,10 +72,10 @@ def fastest(speeds: Iterable[Array]) -> float:
 
 
 def over_drive(axes: Axes, drive: Array, values: Array, parts: Sequence[tuple[int, int]], name: str) -> None:
-    """A thin dark line over the drive, part by part, broken where values are missing."""
+    """A thin line over the drive, part by part, broken where values are missing."""
     for k, (start, stop) in enumerate(parts):
         axes.plot(
-            drive[start:stop], values[start:stop], color="#1b1f24", linewidth=0.7, label=None if k else name,
+            drive[start:stop], values[start:stop], color=drawing.MODEL, linewidth=0.9, label=None if k else name,
             rasterized=stop - start > drawing.MOST_POINTS,
         )
 
@@ -90,7 +90,8 @@ def worst_stretch(error: Array) -> tuple[int, int]:
 
 
 def stretch_panel(
-    axes: Axes, t: Array, drive: Array, lines: Sequence[tuple[str, Array, dict[str, object]]], error: Array, unit: str | None
+    axes: Axes, t: Array, drive: Array, lines: Sequence[tuple[str, Array, drawing.Style]], error: Array,
+    unit: str | None,
 ) -> tuple[int, int]:
     """The worst stretch of `error` with as much before and behind it, less the straight line through the first of
     `lines` over the drive; returns the samples of the stretch."""
@@ -164,20 +165,23 @@ def mark_mains(axes: Axes, hertz: Array, values: Array, known: Sequence[float] =
         if peak or line in MAINS:
             axes.annotate(
                 f"{line:g} Hz" if peak else f"{line:g}", (line, 0.02), xycoords=("data", "axes fraction"),
-                xytext=(-2, 0), textcoords="offset points", fontsize=8, color=colour, rotation=90, ha="right", va="bottom",
-                fontweight="bold" if peak else "normal",
+                xytext=(-2, 0), textcoords="offset points", fontsize=8, color=colour, rotation=90, ha="right",
+                va="bottom", fontweight="bold" if peak else "normal",
             )
 
 
-def mains_words(hertz: Array, values: Array) -> str:
-    """A sentence on the mains, for a caption."""
+def mains_words(hertz: Array, values: Array, known: Sequence[float] = ()) -> str:
+    """A sentence on the mains, for a caption; `known`: as for `mark_mains`."""
     marked = mains(hertz)
     if not marked:
         apart = "these samples are too few or too slow to tell the mains (50 or 60 Hz) from other frequencies"
         return f"No mains are marked: {apart}."
-    peaks = [f"{line:g}" for line in marked if raised(hertz, values, line)]
-    said = f"a peak stands out at {' and '.join(peaks)} Hz" if peaks else "no peak stands out there"
-    return f"Dotted: the mains, 50 and 60 Hz, and their multiples up to the {marked[-1]:g} Hz that the record shows; {said}."
+    others = [line for line in marked if not any(abs(line - other) < APART * float(hertz[0]) for other in known)]
+    peaks = [f"{line:g}" for line in others if raised(hertz, values, line)]
+    named = f"{' and '.join(f'{line:.4g}' for line in known)} Hz, found in the records, is named; " if known else ""
+    no_peak = f"no {'other ' if known else ''}peak stands out there"
+    said = named + (f"a peak stands out at {' and '.join(peaks)} Hz" if peaks else no_peak)
+    return f"Dotted: the mains, 50 and 60 Hz, and their multiples up to {marked[-1]:g} Hz; {said}."
 
 
 def response(

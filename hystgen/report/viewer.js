@@ -69,6 +69,8 @@ function make(tag, parent, text, attributes) {
   return made;
 }
 
+// The last of several models is the one that the report is about
+const colour = (k, names) => COLOURS[names.length - 1 - k];
 const withUnit = (name, unit) => unit ? `${name} (${unit})` : name;
 const digits = step => Math.min(12, Math.max(0, Math.ceil(-Math.log10(step))));
 const plain = (value, step) => value === value ? value.toFixed(digits(step)) : "not compared";
@@ -185,9 +187,9 @@ function start(root) {
   }
 
   // A line through the extremes of blocks, broken where values are missing or time jumps
-  function line(c, levels, px, py, wide, colour, width, dots) {
+  function line(c, levels, px, py, wide, ink, width, dots) {
     const [{low, high}, a, b, size] = blocks(levels, wide);
-    c.strokeStyle = c.fillStyle = colour;
+    c.strokeStyle = c.fillStyle = ink;
     c.lineWidth = width;
     c.beginPath();
     let before = NaN;
@@ -205,8 +207,8 @@ function start(root) {
 
   function legend(c, x, y, entries) {
     c.textAlign = "right";
-    for (const [name, colour] of [...entries].reverse()) {
-      c.fillStyle = colour;
+    for (const [name, ink] of [...entries].reverse()) {
+      c.fillStyle = ink;
       c.fillText(name, x, y);
       x -= c.measureText(name).width + 12;
     }
@@ -218,8 +220,8 @@ function start(root) {
     const strips = [[0, 0.46], [0.46, 0.76], [0.76, 1]].map(([a, b]) => [LEFT, w - RIGHT, 18 + a * room, b * room - 4]);
     const what = bent.checked ? "displacement \u2212 line" : "displacement";
     const panels = [
-      [withUnit(narrow(w) ? "" : what, output), shown, [[MEASURED, 2.4], ...names.map((_, k) => [COLOURS[k], 1.1])], [["measured", MEASURED], ...names.map((name, k) => [name, COLOURS[k]])]],
-      [withUnit("error", output), data.errors, names.map((_, k) => [COLOURS[k], 1.1]), []],
+      [narrow(w) ? output : withUnit(what, output), shown, [[MEASURED, 2.4], ...names.map((_, k) => [colour(k, names), 1.1])], [["measured", MEASURED], ...names.map((name, k) => [name, colour(k, names)])]],
+      [withUnit("error", output), data.errors, names.map((_, k) => [colour(k, names), 1.1]), []],
       [withUnit("drive", input), [data.drive], [[DRIVE, 1.2]], []],
     ];
     panels.forEach(([title, all, styles, entries], k) => {
@@ -252,7 +254,7 @@ function start(root) {
     const limits = extremes(shown, wide), [px, py] = axes(c, box, limits, extremes([data.drive], wide), withUnit(what, output), withUnit("drive", input));
     shown.forEach((levels, j) => {
       const [drive, a, b, size] = blocks(data.drive, wide), [{low, high}] = blocks(levels, wide);
-      c.strokeStyle = j ? COLOURS[j - 1] : MEASURED;
+      c.strokeStyle = j ? colour(j - 1, given.models) : MEASURED;
       c.lineWidth = j ? 1.1 : 2.4;
       c.beginPath();
       let before = NaN;
@@ -271,7 +273,7 @@ function start(root) {
     const [v, y, ...models] = [data.v, data.y, ...data.models].map(x => x[cursor]), unit = x => x ? ` ${x}` : "";
     const steps = record.channels.map(each => each.step), said = [
       `time ${plain(data.t[cursor], record.tick)} s`, `drive ${plain(v, steps[0])}${unit(input)}`,
-      `measured ${y === y ? plain(y, steps[1]) + unit(output) : "faulty"}`,
+      `measured ${plain(y, steps[1])}${y === y ? unit(output) : ""}`,
     ];
     models.forEach((m, k) => said.push(m === m
       ? `${given.models[k]} ${plain(m, steps[k + 2])}${unit(output)}, error ${plain(y - m, steps[1])}${unit(output)}`

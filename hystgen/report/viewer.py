@@ -20,8 +20,8 @@ from hystgen.report.panels import straight_line
 Array = NDArray[np.float64]
 
 FINE = 1e-6
-"""[fraction of a channel's span] Values are rounded to a step of 1, 2 or 5 times a power of ten of at most this: a tenth
-of a code of a converter with 16 bits, so that reading is never coarser than recording."""
+"""[fraction of a channel's span] Values are rounded to a step of 1, 2 or 5 times a power of ten of at most this, less
+than a tenth of a code of a converter with 16 bits, so that reading is never coarser than recording."""
 
 MOST_SAMPLES = 1_000_000
 """Samples in one page, of all records together. A sample takes 4 to 9 bytes, so the page grows by at most 9 MB. Records
@@ -155,10 +155,8 @@ def channel(values: Array, step: float | None = None) -> dict[str, object]:
     whole = np.rint((filled - zero) / step).astype(np.int64)
     forms = [_bytes(np.diff(whole, n=order, prepend=np.zeros(order, dtype=np.int64))) for order in (0, 1, 2)]
     order = min((0, 1, 2), key=lambda k: len(forms[k]))
-    return {
-        "zero": zero, "step": step, "order": order, "holes": holes,
-        "data": base64.b64encode(forms[order]).decode("ascii"),
-    }  # fmt: skip
+    data = base64.b64encode(forms[order]).decode("ascii")
+    return {"zero": zero, "step": step, "order": order, "holes": holes, "data": data}
 
 
 def _bytes(whole: NDArray[np.int64]) -> bytes:
