@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hystgen.basics import drawing
 from hystgen.report import viewer
 from hystgen.report.html import HtmlTable, Picture, Section, Text, page
-from hystgen.report.viewer import Viewed, Viewer, channel, straight_line
+from hystgen.report.viewer import Viewed, Viewer, channel
 
 Array = NDArray[np.float64]
 
@@ -111,14 +111,6 @@ def test_uneven_times_are_kept() -> None:
     uneven = Viewed("a", "fit", 5.0 + t, even.v, even.y, even.models)
     (record,) = json.loads(Viewer([uneven], ("V", "um")).packed())["records"]
     np.testing.assert_allclose(unpacked(record["time"], 1000), t, atol=1e-5)
-
-
-def test_the_straight_line_is_that_of_least_squares() -> None:
-    each = made("a", 1000, 1)
-    known = np.isfinite(each.y)
-    slope, offset = np.polyfit(each.v[known], each.y[known], 1)
-    assert straight_line(each.v, each.y) == pytest.approx((offset, slope))
-    assert straight_line(np.ones(4), np.arange(4.0)) == (1.5, 0.0)
 
 
 # In a browser ----------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     return page(f"{found.parameters.name}: diagnosis", top, sections)
 
 
-BY_NAME = {"bode": "Frequency response", "creep": "Creep"}
+BY_NAME = {"bode": "Frequency response", "stops": "Creep"}
 """Figures of certain effects, with the titles of their sections."""
 
 

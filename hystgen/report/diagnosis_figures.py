@@ -133,7 +133,8 @@ def overlay(found: Diagnosis, width: float) -> Figure:
         lines += [("refitted", each.y - each.before, {"color": BEFORE, "linewidth": 0.9})] if named else []
         lines.append((what, each.y - each.after, drawing.LINES["model"]))
         t = each.t - each.t[0]
-        first, last = panels.stretch_panel(stretch, t, each.v, lines, each.before if named else each.after, unit)
+        error, pad = each.before if named else each.after, 8.0 if width == WIDE else 34.0
+        first, last = panels.stretch_panel(stretch, t, each.v, lines, error, unit, pad)
         stretch.set(xlabel="time in the record (s)")
         drawing.legend_above(stretch, 3 if width == WIDE else 2)
         bottom.axvspan(t[first], t[last - 1], color=drawing.GAP, alpha=0.15, linewidth=0)
@@ -233,7 +234,7 @@ def _dynamic(found: Diagnosis) -> list[Effect]:
     return [each for each in found.parameters.model.effects if each.response(np.ones(1)) is not None]
 
 
-def creep(found: Diagnosis, width: float) -> Figure:
+def stops(found: Diagnosis, width: float) -> Figure:
     """Motion after the drive has stopped over the logarithm of time, measured, and with and without the effects."""
     holds, unit = _holds(found), found.result.unit
     wide = width == WIDE
@@ -262,8 +263,11 @@ def creep(found: Diagnosis, width: float) -> Figure:
     return drawn
 
 
-PER_HOLD, HOLDS = 40, 3
-"""Number of points of a creep curve, and of holds that are drawn."""
+PER_HOLD = 40
+"""Maximum number of points of a curve after a stop."""
+
+HOLDS = 3
+"""Maximum number of holds that are drawn."""
 
 
 def _mean(values: Array) -> float:
@@ -286,7 +290,7 @@ def applies(found: Diagnosis, name: str) -> bool:
     """Whether there is something to draw in a figure."""
     if name == "bode":
         return bool(_dynamic(found))
-    if name == "creep":
+    if name == "stops":
         return any(each.creeps for each in found.parameters.model.effects) and bool(_holds(found))
     return True
 
@@ -454,7 +458,7 @@ def _rms(e: Array) -> float:
 
 FIGURES = {
     "gap": gap, "overlay": overlay, "deviation": deviation, "records": records, "time": time, "against": against,
-    "frequency": frequency, "bode": bode, "creep": creep,
+    "frequency": frequency, "bode": bode, "stops": stops,
 }
 
 
@@ -482,7 +486,7 @@ def caption(found: Diagnosis, name: str) -> str:
         "bode": "Gain and phase from the motion of the refitted model to the measured motion and to that of the model "
         f"with the effects, where at least {100 * panels.FOLLOWS:.0f} % of the motion's power follows; dashed: the "
         "effects by themselves. The refitted model has no dynamics, so a delay, a lag or a mode shows here as it is.",
-        "creep": "Motion after the drive has stopped, from its first moments on, over the logarithm of time, in the "
+        "stops": "Motion after the drive has stopped, from its first moments on, over the logarithm of time, in the "
         "longest holds: measured, and with and without the effect.",
     }[name]
 
@@ -510,5 +514,5 @@ ALTERNATIVES = {
     "since the drive stopped, with the noise.",
     "frequency": "Spectral density of the error, with that of white noise and the mains marked.",
     "bode": "Gain and phase over frequency, measured, with the effects, and of the effects alone, with their corners.",
-    "creep": "Motion after stops of the drive over the logarithm of time, measured, and with and without the effect.",
+    "stops": "Motion after stops of the drive over the logarithm of time, measured, and with and without the effect.",
 }

@@ -310,7 +310,8 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
         below.set_xlim(each.time[0], each.time[-1])
         lines = [(name, values, drawing.LINES[name]) for name, values in (("measured", each.measured),
                                                                           ("model", each.model))]
-        first, last = panels.stretch_panel(worst, each.time, each.drive, lines, each.residual, units.output)
+        first, last = panels.stretch_panel(worst, each.time, each.drive, lines, each.residual, units.output,
+                                          8.0 if wide else 20.0)
         worst.set(xlabel="time (s)")
         drawing.legend_above(worst)
         below.axvspan(each.time[first], each.time[last - 1], color=drawing.GAP, alpha=0.15, linewidth=0)

@@ -21,9 +21,12 @@ Array = NDArray[np.float64]
 FASTEST = 0.98
 """[quantile] Faster samples have the last colour, so that a few steps do not leave one colour for all else."""
 
-STRETCH, LEAST = 25, 32
-"""The worst stretch is this fraction of a record, at least so many samples: long enough for the course of the error,
-short enough that the motion within does not hide it."""
+STRETCHES = 25
+"""[of a record] The worst stretch is one of so many: long enough for the course of the error, short enough that the
+motion within does not hide it."""
+
+LEAST = 32
+"""[samples] Minimum length of that stretch."""
 
 MAINS, HARMONICS = (50.0, 60.0), 3
 """Frequencies in Hz of the mains, and the number of multiples of each that are marked."""
@@ -32,9 +35,9 @@ APART = 2.0
 """[bins] Lines closer than this merge in a spectrum with a Hann window: 50 and 60 Hz are marked if they are at least
 this far apart."""
 
-RAISED = 3.0
-"""[times] A peak this far above the median of its surroundings is named; the largest of five neighbouring bins of white
-noise, averaged over seven half overlapping windows, exceeds it less than once in 1e6. Set by: tests/test_panels.py."""
+RAISED = 2.5
+"""[times] A peak this far above the median of its surroundings is named: white noise has none in 2,000 tries, a line of
+0.45 standard deviations of the noise one in all of 50, in 2,048 samples. Set by: tests/test_panels.py."""
 
 
 def straight_line(x: Array, y: Array) -> tuple[float, float]:
@@ -82,7 +85,7 @@ def over_drive(axes: Axes, drive: Array, values: Array, parts: Sequence[tuple[in
 
 def worst_stretch(error: Array) -> tuple[int, int]:
     """The samples [first, last) with the largest rms error of any stretch of that length."""
-    length = min(max(LEAST, len(error) // STRETCH), len(error))
+    length = min(max(LEAST, len(error) // STRETCHES), len(error))
     known = np.isfinite(error)
     squares = np.concatenate([[0.0], np.cumsum(np.where(known, error, 0.0) ** 2)])
     first = int(np.argmax(squares[length:] - squares[:-length]))
@@ -91,10 +94,10 @@ def worst_stretch(error: Array) -> tuple[int, int]:
 
 def stretch_panel(
     axes: Axes, t: Array, drive: Array, lines: Sequence[tuple[str, Array, drawing.Style]], error: Array,
-    unit: str | None,
+    unit: str | None, pad: float = 8.0,
 ) -> tuple[int, int]:
     """The worst stretch of `error` with as much before and behind it, less the straight line through the first of
-    `lines` over the drive; returns the samples of the stretch."""
+    `lines` over the drive; returns the samples of the stretch. `pad`: room in points between panel and title."""
     first, last = worst_stretch(error)
     half = (last - first) // 2
     here = slice(max(first - half, 0), min(last + half, len(t)))
@@ -107,7 +110,7 @@ def stretch_panel(
     axes.set_xlim(t[here.start], t[here.stop - 1])
     known = error[first:last][np.isfinite(error[first:last])]
     rms = float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
-    axes.set_title(f"Worst stretch: error {rms:.3g}{f' {unit}' if unit else ''} rms", fontsize=9.5, pad=8)
+    axes.set_title(f"Worst stretch: error {rms:.3g}{f' {unit}' if unit else ''} rms", fontsize=9.5, pad=pad)
     return first, last
 
 
@@ -130,7 +133,7 @@ def density(t: Array, error: Array) -> tuple[Array, Array] | None:
     longest = found[0].stop - found[0].start if found else 0
     if longest < 64:
         return None
-    length = min(longest, max(256, longest // 4))
+    length = longest // 4  # seven windows that half overlap, so that noise has no peaks
     parts = [error[each] for each in found if each.stop - each.start >= length]
     rate = 1.0 / float(np.median(np.diff(t)))
     spectra = [welch(part, rate, nperseg=length) for part in parts]

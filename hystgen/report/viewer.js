@@ -107,8 +107,8 @@ function start(root) {
     "aria-label": "Measured and model, error and drive over time. Left and right arrows: to the next point; "
       + "with Shift: half a window; plus and minus: zoom; Home: whole record; End: last sample.",
   });
-  const loop = make("canvas", area, "", {class: "loop", role: "img", "aria-label": "The window above over the drive"});
-  const values = make("output", root, "", {"aria-live": "polite"});
+  const values = make("output", area, "", {"aria-live": "polite"});
+  const loop = make("canvas", area, "", {class: "loop", role: "img", "aria-label": "The same window over the drive"});
 
   root.append(how);
 

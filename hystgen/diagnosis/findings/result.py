@@ -240,7 +240,7 @@ class Diagnosis:
     def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Figure:
         """A figure from the report; the default shows how each effect reduces the held-out error.
 
-        `which`: gap, overlay, deviation, records, time, against, frequency, and bode or creep if an effect has one.
+        `which`: gap, overlay, deviation, records, time, against, frequency, and bode or stops if an effect shows there.
         Returns a matplotlib Figure, which a notebook displays; with `path`, it is also written to that .png or .svg
         file. Raises ValueError, PlotError, OSError.
         """
