@@ -87,6 +87,7 @@ class TestSpectrum:
         assert panels.mains(fine) == [50.0, 60.0, 100.0, 120.0, 150.0, 180.0]
         assert panels.mains(coarse) == []
         assert panels.mains(np.arange(1, 110) * 1.0) == [50.0, 60.0, 100.0]
+        assert panels.mains(np.arange(1, 101) * 1.0) == [50.0, 60.0]
         assert "cannot" not in panels.mains_words(fine, np.ones(199))
         assert "No mains are marked" in panels.mains_words(coarse, np.ones(99))
 

@@ -106,6 +106,12 @@ def stretch_panel(
     for name, values, style in lines:
         chosen = here.start + drawing.kept(0, here.stop - here.start, values[here])
         axes.plot(t[chosen], (values - bent)[chosen], label=name, **style)
+    # samples that were not compared may lie far away
+    near = np.concatenate([(values - bent)[here][np.isfinite(error[here])] for _, values, _ in lines])
+    near = near[np.isfinite(near)]
+    if len(near):
+        margin = 0.08 * float(np.ptp(near)) or 1.0
+        axes.set_ylim(float(near.min()) - margin, float(near.max()) + margin)
     axes.set(ylabel=label("displ. \N{MINUS SIGN} line", unit))
     axes.set_xlim(t[here.start], t[here.stop - 1])
     known = error[first:last][np.isfinite(error[first:last])]
@@ -145,7 +151,8 @@ def mains(hertz: Array) -> list[float]:
     """Frequencies of the mains and their multiples that a spectrum resolves; empty if it cannot tell them apart."""
     if abs(MAINS[1] - MAINS[0]) < APART * float(hertz[0]):
         return []
-    return sorted({k * each for each in MAINS for k in range(1, HARMONICS + 1) if k * each < hertz[-1]})
+    last = float(hertz[-1]) - APART * float(hertz[0])  # nothing is told from the end of the spectrum
+    return sorted({k * each for each in MAINS for k in range(1, HARMONICS + 1) if k * each < last})
 
 
 def raised(hertz: Array, values: Array, line: float) -> bool:

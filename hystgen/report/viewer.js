@@ -142,6 +142,7 @@ function start(root) {
     canvas.height = Math.round(h * ratio);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.font = "12px system-ui, sans-serif";
+    c.lineJoin = "bevel"; // mitred corners would stand out beyond the extremes
     return [c, w, h];
   }
 
@@ -159,9 +160,22 @@ function start(root) {
       const [{low: l, high: h}, a, b] = blocks(levels, wide);
       for (let i = a; i < b; i++) { if (l[i] < low) low = l[i]; if (h[i] > high) high = h[i]; }
     }
+    return [low, high];
+  }
+
+  function limits(all, wide) {
+    let [low, high] = extremes(all, wide);
     if (!(low <= high)) [low, high] = [-1, 1];
     const margin = 0.06 * (high - low) || 0.5 * Math.abs(high) || 1;
     return [low - margin, high + margin];
+  }
+
+  // Limits of measured and models by the samples that were compared, if there are any
+  function compared(shown, wide) {
+    const [low, high] = extremes(shown.slice(1), wide), [under, over] = extremes(data.errors, wide);
+    if (!(low <= high)) return limits(shown, wide);
+    const a = low + Math.min(under, 0), b = high + Math.max(over, 0), margin = 0.04 * (b - a) || 1;
+    return [a - margin, b + margin];
   }
 
   // Axes with ticks and a title; returns the maps to pixels
@@ -176,7 +190,7 @@ function start(root) {
       c.fillText(text, x0 - 5, py(at) + 4);
     }
     c.textAlign = "center";
-    for (const [at, text] of ticks(left, right, Math.max(2, (x1 - x0) / 90))) {
+    for (const [at, text] of ticks(left, right, Math.max(2, (x1 - x0) / 65))) {
       c.beginPath(); c.moveTo(px(at), y0); c.lineTo(px(at), y1); c.stroke();
       if (below) c.fillText(text, px(at), y1 + 15);
     }
@@ -225,8 +239,8 @@ function start(root) {
       [withUnit("drive", input), [data.drive], [[DRIVE, 1.2]], []],
     ];
     panels.forEach(([title, all, styles, entries], k) => {
-      const box = strips[k], limits = extremes(all, wide);
-      const [px, py] = axes(c, box, limits, [from, to], title, k === 2 ? "time (s)" : "");
+      const box = strips[k], heights = k ? limits(all, wide) : compared(all, wide);
+      const [px, py] = axes(c, box, heights, [from, to], title, k === 2 ? "time (s)" : "");
       legend(c, box[1], box[2] - 5, entries);
       c.save();
       c.beginPath(); c.rect(box[0], box[2], box[1] - box[0], box[3] - box[2]); c.clip();
@@ -251,7 +265,10 @@ function start(root) {
   // The window over the drive: the extremes of each block at the middle of its drive
   function drawLoop(what, shown) {
     const [c, w, h] = cleared(loop), box = [LEFT, w - RIGHT, 18, h - 34], wide = 2000;
-    const limits = extremes(shown, wide), [px, py] = axes(c, box, limits, extremes([data.drive], wide), withUnit(what, output), withUnit("drive", input));
+    const sides = limits([data.drive], wide);
+    const [px, py] = axes(c, box, compared(shown, wide), sides, withUnit(what, output), withUnit("drive", input));
+    c.save();
+    c.beginPath(); c.rect(box[0], box[2], box[1] - box[0], box[3] - box[2]); c.clip();
     shown.forEach((levels, j) => {
       const [drive, a, b, size] = blocks(data.drive, wide), [{low, high}] = blocks(levels, wide);
       c.strokeStyle = j ? colour(j - 1, given.models) : MEASURED;
@@ -267,6 +284,7 @@ function start(root) {
       }
       c.stroke();
     });
+    c.restore();
   }
 
   function say() {
