@@ -230,8 +230,14 @@ def _phase(h: NDArray[np.complex128]) -> Array:
 
 
 def _dynamic(found: Diagnosis) -> list[Effect]:
-    """Effects of the model that have a frequency response."""
-    return [each for each in found.parameters.model.effects if each.response(np.ones(1)) is not None]
+    """Effects that were named and have a frequency response."""
+    return [each for each in _named(found) if each.response(np.ones(1)) is not None]
+
+
+def _named(found: Diagnosis) -> list[Effect]:
+    """Effects of the model that were named; those of the model as given are in the refitted one too."""
+    names = {effect.name for effect in found.result.effects}
+    return [each for each in found.parameters.model.effects if each.name in names]
 
 
 def stops(found: Diagnosis, width: float) -> Figure:
@@ -291,7 +297,7 @@ def applies(found: Diagnosis, name: str) -> bool:
     if name == "bode":
         return bool(_dynamic(found))
     if name == "stops":
-        return any(each.creeps for each in found.parameters.model.effects) and bool(_holds(found))
+        return any(each.creeps for each in _named(found)) and bool(_holds(found))
     return True
 
 
@@ -485,7 +491,7 @@ def caption(found: Diagnosis, name: str) -> str:
         + _mains(found),
         "bode": "Gain and phase from the motion of the refitted model to the measured motion and to that of the model "
         f"with the effects, where at least {100 * panels.FOLLOWS:.0f} % of the motion's power follows; dashed: the "
-        "effects by themselves. The refitted model has no dynamics, so a delay, a lag or a mode shows here as it is.",
+        "effects by themselves. The refitted model lacks these effects, so they show as they are measured.",
         "stops": "Motion after the drive has stopped, from its first moments on, over the logarithm of time, in the "
         "longest holds: measured, and with and without the effect.",
     }[name]
