@@ -179,7 +179,7 @@ def diagnosis(effects: str, named: bool = True) -> Diagnosis:
     before[:200] = np.nan
     signals = tuple(
         Signals(f"{role}.csv", held, t, v, y, before, noise if named else before)
-        for role, held in (("fit", False), ("<b>held", True))
+        for role, held in (("fit", False), ("<b>$\\frac$", True))
     )
     names = ("lag", "creep") if named else ()
     found = tuple(NamedEffect(name, {}, {}, 0.9, 0.14, 0.01, 1e-9, "") for name in names)
@@ -254,7 +254,7 @@ def test_every_legend_entry_is_drawn(named: bool, with_effects: Diagnosis) -> No
 
 def test_the_page_folds_what_was_refused_and_escapes_names(with_effects: Diagnosis) -> None:
     page = report.html(with_effects, "text of the file")
-    assert "<b>held" not in page
+    assert "<b>$" not in page
     titles = re.findall(r"<h2>(.*?)</h2>", page)
     assert "Frequency response" in titles
     assert "Creep" in titles

@@ -39,6 +39,7 @@ LINES: dict[str, Style] = {
 
 STYLE = {
     "svg.hashsalt": "hystgen",
+    "text.parse_math": False,  # names of records may contain dollars
     "axes.grid": True,
     "grid.alpha": 0.3,
     "grid.linewidth": 0.6,
