@@ -298,9 +298,8 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     record."""
     pair, units = drawn_ones(shown), fit.parameters.units
     figure = drawing.figure(9.6 if wide else 4.4, 6.4 * len(pair))
-    rows = figure.subfigures(len(pair), 1, squeeze=False)
-    for row, each in zip(rows.flat, pair, strict=True):
-        above, below, worst = row.subplots(3, 1, height_ratios=(2, 1, 1.7))
+    grid = figure.subplots(3 * len(pair), 1, height_ratios=(2, 1, 1.7) * len(pair))
+    for above, below, worst, each in zip(grid[::3], grid[1::3], grid[2::3], pair, strict=True):
         above.sharex(below)
         above.tick_params(labelbottom=False)
         overlay_panel(above, each, units)

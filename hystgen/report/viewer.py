@@ -59,7 +59,7 @@ class Viewer:
         return json.dumps(
             {
                 "units": [unit or "" for unit in self.units],
-                "noise": self.noise,
+                "noise": None if self.noise is None else _short(self.noise),
                 "models": [*self.records[0].models],
                 "records": [_packed(each, self._share) for each in self.records],
             },
@@ -125,9 +125,14 @@ def _packed(record: Viewed, most: int) -> dict[str, object]:
         "spacing": spacing if len(chosen) == len(t) else float(np.median(np.diff(t[chosen]))),
         "tick": tick,
         "time": None if even else channel(t[chosen], tick),
-        "line": straight_line(record.v, record.y),
+        "line": [_short(number) for number in straight_line(record.v, record.y)],
         "channels": [channel(each[chosen]) for each in (record.v, record.y, *models)],
     }
+
+
+def _short(number: float) -> float:
+    """A number of nine digits."""
+    return float(f"{number:.9g}")
 
 
 def _round(step: float) -> float:
@@ -149,9 +154,11 @@ def channel(values: Array, step: float | None = None) -> dict[str, object]:
     there = np.maximum.accumulate(np.where(known, np.arange(len(values)), 0))
     filled = values[there]
     filled[~np.isfinite(filled)] = values[known][0] if known.any() else 0.0
-    zero, span = float(filled.min()), float(np.ptp(filled))
+    span = float(np.ptp(filled))
     if step is None:
         step = _round(FINE * span) if span > 0.0 else 1.0
+    # whole steps: compiled and interpreted functions differ in the last bit, which must not show
+    zero = float(np.rint(filled.min() / step) * step) if span > 0.0 else float(filled[0])
     whole = np.rint((filled - zero) / step).astype(np.int64)
     forms = [_bytes(np.diff(whole, n=order, prepend=np.zeros(order, dtype=np.int64))) for order in (0, 1, 2)]
     order = min((0, 1, 2), key=lambda k: len(forms[k]))
