@@ -161,7 +161,8 @@ def content(drawn: Figure, kind: str) -> bytes:
         drawn.set_layout_engine(None)
         # the solver's last bits vary from run to run, and names of clip paths in an SVG depend on them
         for axes in drawn.axes:
-            axes.set_position([round(float(place), 7) for place in axes.get_position(original=True).bounds])
+            x, y, width, height = (round(float(place), 7) for place in axes.get_position(original=True).bounds)
+            axes.set_position((x, y, width, height))
     out = io.BytesIO()
     metadata = {"Software": None} if kind == "png" else dict.fromkeys(("Date", "Creator", "Format", "Type"))
     drawn.savefig(out, format=kind, metadata=metadata)
