@@ -29,7 +29,9 @@ Array = NDArray[np.float64]
 MEASURED, MODEL, RESIDUAL, OTHER = "#1f5a99", "#c2410c", "#3f7d3a", "#5b4a91"
 IGNORED, GAP, FAULT, QUIET = "#8a929c", "#e0a526", "#b01030", "#6b7280"
 
-LINES: dict[str, dict[str, Any]] = {
+Style = dict[str, Any]
+
+LINES: dict[str, Style] = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }
@@ -37,6 +39,7 @@ LINES: dict[str, dict[str, Any]] = {
 
 STYLE = {
     "svg.hashsalt": "hystgen",
+    "text.parse_math": False,  # names of records may contain dollars
     "axes.grid": True,
     "grid.alpha": 0.3,
     "grid.linewidth": 0.6,
@@ -156,6 +159,10 @@ def content(drawn: Figure, kind: str) -> bytes:
     if engine is not None:  # savefig would draw everything a second time for the layout
         engine.execute(drawn)
         drawn.set_layout_engine(None)
+        # the solver's last bits vary from run to run, and names of clip paths in an SVG depend on them
+        for axes in drawn.axes:
+            x, y, width, height = (round(float(place), 7) for place in axes.get_position(original=True).bounds)
+            axes.set_position((x, y, width, height))
     out = io.BytesIO()
     metadata = {"Software": None} if kind == "png" else dict.fromkeys(("Date", "Creator", "Format", "Type"))
     drawn.savefig(out, format=kind, metadata=metadata)
@@ -175,6 +182,21 @@ def noise_lines(axes: Axes, noise: float | None) -> None:
         axes.axhline(side, color=FAULT, linewidth=1.0, linestyle="--", label=name)
 
 
+def decades(axes: Axes, which: str, limits: tuple[float, float] | None = None) -> None:
+    """Make an axis logarithmic, with few plain numbers; `limits`: its ends, those of what is drawn if not given."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axes.set(**{f"{which}scale": "log"})
+    if limits is not None:
+        axes.set(**{f"{which}lim": limits})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    subs = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
 def legend_above(axes: Axes, columns: int = 3) -> None:
     """Place the legend above the plot area, where it hides nothing."""
     axes.legend(
@@ -183,12 +205,12 @@ def legend_above(axes: Axes, columns: int = 3) -> None:
     )
 
 
-def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
+def kept(start: int, stop: int, *signals: Array, blocks: int = BLOCKS) -> NDArray[np.intp]:
     """Indices from start to stop that suffice to draw the same lines: each block's extremes of every signal."""
     count = stop - start
-    if count <= 4 * BLOCKS:
+    if count <= 4 * blocks:
         return np.arange(start, stop)
-    edges = np.linspace(0, count, BLOCKS + 1).astype(int)
+    edges = np.linspace(0, count, blocks + 1).astype(int)
     found = [np.array([0, count - 1])]
     for signal in signals:
         part = signal[start:stop]

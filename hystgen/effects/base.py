@@ -261,6 +261,8 @@ class Effect(BaseModel):
     """planned records that show it, and its rank among the effects that each record shows, 1 for the most visible"""
     rank: ClassVar[float] = math.inf
     """order of effects that explain records equally well: a lag or delay, as in every drive, before plays that lag"""
+    creeps: ClassVar[bool] = False
+    """whether it is the motion that goes on long after the drive has stopped, drawn over the logarithm of time"""
     from_start: ClassVar[bool] = False
     """whether it depends on the time since the first sample"""
     block: ClassVar[OwnBlock | None] = None
@@ -298,6 +300,15 @@ class Effect(BaseModel):
         """Longest time constant, or duration of a move over the drive's range, in s; 0 for an effect without either,
         inf for an effect that never ends."""
         return 0.0
+
+    def response(self, hertz: Array) -> NDArray[np.complex128] | None:
+        """DRIVE, LINEAR: frequency response (N,), 1 at rest; None for an effect that has none or is slow."""
+        return None
+
+    @property
+    def corner(self) -> tuple[float, str] | None:
+        """The frequency in Hz that marks its response, and the word for it; None for an effect without one."""
+        return None
 
     def drive(self, a: Array, run: Run) -> Array:
         """DRIVE: the drive (N,) behind the effect."""

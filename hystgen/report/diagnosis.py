@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 from hystgen import diagnosis
 from hystgen.basics import drawing, parallel
 from hystgen.basics.drawing import label
-from hystgen.basics.problems import percent
+from hystgen.basics.problems import counted, percent
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structured, times_noise
-from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
+from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result, Signals
 from hystgen.diagnosis.search.acceptance import is_noise
-from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
-from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
+from hystgen.report.diagnosis_figures import ALTERNATIVES, FIGURES, NARROW, WIDE, applies, caption
+from hystgen.report.html import Details, Folded, HtmlTable, Listing, Picture, Section, Text, page
 from hystgen.report.properties import settling
+from hystgen.report.viewer import Viewed, Viewer
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -36,8 +37,10 @@ P = ParamSpec("P")
 def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
     @functools.wraps(find)
     def found(*given: P.args, **named: P.kwargs) -> Diagnosis:
-        figures = {name: functools.partial(draw, width=WIDE) for name, draw in FIGURES.items()}
-        return replace(find(*given, **named), page=html, figures=figures)
+        made = find(*given, **named)
+        names = [name for name in FIGURES if applies(made, name)]
+        figures = {name: functools.partial(FIGURES[name], width=WIDE) for name in names}
+        return replace(made, page=html, figures=figures)
 
     return found
 
@@ -49,15 +52,16 @@ diagnose = _with_page(diagnosis.diagnose)
 def html(found: Diagnosis, parameters_text: str) -> str:
     """The page. Raises PlotError without matplotlib."""
     result = found.result
-    each = list(itertools.product(FIGURES, (WIDE, NARROW)))
+    names = [name for name in FIGURES if applies(found, name)]
+    each = list(itertools.product(names, (WIDE, NARROW)))
     with drawing.styled():
         contents = parallel.each(
             lambda one: drawing.content(FIGURES[one[0]](found, one[1]), "svg"), each, parallel.cores()
         )
     drawn = dict(zip(each, contents, strict=True))
     figures = {
-        name: Picture(name, drawn[name, WIDE], drawn[name, NARROW], CAPTIONS[name], ALTERNATIVES[name])
-        for name in FIGURES
+        name: Picture(name, drawn[name, WIDE], drawn[name, NARROW], caption(found, name), ALTERNATIVES[name])
+        for name in names
     }
     sections = [
         Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
@@ -65,7 +69,9 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Settling", [Text(f"The output of the model with the effects is {settling(found.model)}.")]),
         Section("Remaining error", _left(result)),
         Section("Faults of the data", _faults(result)),
-        Section("Before and after, on held-out records", [figures["overlay"]]),
+        Section("Before and after, on held-out records", [figures["overlay"], figures["deviation"]]),
+        Section("Zoom and read values", [_zoom(found)]),
+        *(Section(title, [figures[name]]) for name, title in BY_NAME.items() if name in figures),
         Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(result)]),
         Section("What the error depends on", [figures["against"], figures["frequency"]]),
         Section("What cannot be separated", _rivals(result)),
@@ -77,6 +83,23 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     warnings = [Text(f"About the inverse: {said}.") for said in found.warnings]
     top = [Text(found.sentence()), *warnings, _next_step(found)]
     return page(f"{found.parameters.name}: diagnosis", top, sections)
+
+
+BY_NAME = {"bode": "Frequency response", "stops": "Creep"}
+"""Figures of certain effects, with the titles of their sections."""
+
+
+def _zoom(found: Diagnosis) -> Viewer:
+    """The records with the errors before and after, held-out ones first."""
+    named, units = bool(found.result.effects), found.parameters.units
+
+    def viewed(each: Signals) -> Viewed:
+        after = each.y - each.after
+        models = {"refitted": each.y - each.before, "with the effects": after} if named else {"refitted model": after}
+        return Viewed(each.name, "held out" if each.held_out else "fit", each.t, each.v, each.y, models)
+
+    ordered = sorted(found.signals, key=lambda each: not each.held_out)
+    return Viewer([viewed(each) for each in ordered], (units.input, units.output), found.result.noise_floor)
 
 
 def _next_step(found: Diagnosis) -> Text:
@@ -264,18 +287,21 @@ def _where(result: Result) -> list[Text | HtmlTable]:
     return [Text("The stretches with the largest error of the refitted model:"), HtmlTable(rows, (0, 1))]
 
 
-def _ranking(result: Result) -> list[Text | HtmlTable]:
-    blocks: list[Text | HtmlTable] = []
+def _ranking(result: Result) -> list[Text | Folded]:
+    """All shapes that were fully fitted in one table, folded."""
+    if not result.ranking:
+        return [Text("None: with the refitted model, only noise remains.")]
     unit = result.unit
+    rows: list[Sequence[str]] = [
+        ["round", "effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above best", "why"]
+    ]
     for k, tried in enumerate(result.ranking):
         best = min((each.holdout for each in tried), default=0.0)
-        rows: list[Sequence[str]] = [
-            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "verdict"]
-        ]
         for each in tried:
             margin = percent(each.holdout / best - 1.0, ".1f") if best > 0.0 else ""
             errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
-            rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
-        after = "" if k < len(result.effects) else ", none of which removes enough to be named"
-        blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), HtmlTable(rows, (0, 1, 5))]
-    return blocks or [Text("None: with the refitted model, only noise remains.")]
+            rows.append([str(k + 1), each.name, each.shape, *errors, margin, each.refused or "named"])
+    refused = sum(each.refused is not None for tried in result.ranking for each in tried)
+    said = f"{counted(len(rows) - 1, 'shape')}, {refused} of them refused, and why"
+    rounds = "Each round adds one effect to those already named; it ends when no shape removes enough."
+    return [Folded(said, [Text(rounds), HtmlTable(rows, (1, 2, 6))])]

@@ -14,9 +14,11 @@ from hystgen.basics import drawing
 from hystgen.basics.drawing import label
 from hystgen.identification import faults
 from hystgen.model import cascade_of
+from hystgen.report import panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
 
     from hystgen.identification import Fit, Used
@@ -141,6 +143,20 @@ def loop_panel(axes: Axes, each: Shown, units: Units) -> None:
     drawing.legend_above(axes)
 
 
+def deviation_panel(axes: Axes, each: Shown, units: Units, top: float) -> PathCollection:
+    """Measured, coloured by speed up to `top`, and model over the drive, less the straight line through the measured
+    loop; returns what a colour bar needs."""
+    measured = np.where(each.used.compared, each.measured, np.nan)
+    line = panels.line_of(each.drive, measured)
+    points = panels.by_speed(axes, each.drive, measured - line, np.abs(each.rate), top, "measured, by speed")
+    model = np.where(each.used.compared, each.model - line, np.nan)
+    panels.over_drive(axes, each.drive, model, each.used.parts, "model")
+    axes.set(xlabel=label("drive", units.input), ylabel=label("displacement \N{MINUS SIGN} line", units.output))
+    axes.set_title("Less the straight line", pad=20)
+    drawing.legend_above(axes)
+    return points
+
+
 def _shade(axes: Axes, each: Shown, named: bool) -> None:
     """Samples that were not compared: the start of each part, samples left out, gaps."""
     t = each.time
@@ -263,28 +279,42 @@ def weight_panel(axes: Axes, fit: Fit, units: Units, places: Sequence[int]) -> N
 
 
 def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
-    """Measured and modelled loops for a fitted record and a held-out record."""
+    """Measured and modelled loops for a fitted record and a held-out record, and beside them the same loops less their
+    straight line, coloured by speed."""
     pair, units = drawn_ones(shown), fit.parameters.units
-    figure = drawing.figure(9.6, 4.4) if wide else drawing.figure(4.4, 4.0 * len(pair))
-    axes = figure.subplots(1, len(pair), squeeze=False) if wide else figure.subplots(len(pair), 1, squeeze=False)
-    for ax, each in zip(axes.flat, pair, strict=True):
-        loop_panel(ax, each, units)
+    rows, columns = (len(pair), 2) if wide else (2 * len(pair), 1)
+    figure = drawing.figure(9.6, 4.2 * rows) if wide else drawing.figure(4.4, 3.9 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    top = panels.fastest(np.abs(each.rate) for each in pair)
+    for left, right, each in zip(axes.flat[::2], axes.flat[1::2], pair, strict=True):
+        loop_panel(left, each, units)
+        points = deviation_panel(right, each, units, top)
+        figure.colorbar(points, ax=right, label=label("speed", per_second(units)), pad=0.02, aspect=30)
     return figure
 
 
 def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
-    """Measured and model over time with the residual below, for a fitted record and a held-out record."""
+    """Measured and model over time, the residual, and the worst stretch enlarged, for a fitted record and a held-out
+    record."""
     pair, units = drawn_ones(shown), fit.parameters.units
-    figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
-    rows = figure.subfigures(len(pair), 1, squeeze=False)
-    for row, each in zip(rows.flat, pair, strict=True):
-        above, below = row.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    figure = drawing.figure(9.6 if wide else 4.4, 6.4 * len(pair))
+    grid = figure.subplots(3 * len(pair), 1, height_ratios=(2, 1, 1.7) * len(pair))
+    for above, below, worst, each in zip(grid[::3], grid[1::3], grid[2::3], pair, strict=True):
+        above.sharex(below)
+        above.tick_params(labelbottom=False)
         overlay_panel(above, each, units)
         _shade(below, each, False)
         residual_panel(below, each, units)
         drawing.noise_lines(below, each.noise)
         below.set_xlim(each.time[0], each.time[-1])
-        for ax in (above, below):
+        lines = [(name, values, drawing.LINES[name]) for name, values in (("measured", each.measured),
+                                                                          ("model", each.model))]
+        first, last = panels.stretch_panel(worst, each.time, each.drive, lines, each.residual, units.output,
+                                          8.0 if wide else 20.0)
+        worst.set(xlabel="time (s)")
+        drawing.legend_above(worst)
+        below.axvspan(each.time[first], each.time[last - 1], color=drawing.GAP, alpha=0.15, linewidth=0)
+        for ax in (above, below, worst):
             ax.yaxis.set_label_coords(-0.06 if wide else -0.15, 0.5)
     return figure
 
@@ -296,10 +326,9 @@ def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     left = np.concatenate([each.residual for each in chosen])
     figure = drawing.figure(9.6, 6.4) if wide else drawing.figure(4.4, 11.0)
     axes = figure.subplots(2, 2, sharey=True) if wide else figure.subplots(4, 1)
-    per_second = f"{units.input}/s" if units.input else "1/s"
     against: list[tuple[Callable[[Shown], Array], str]] = [
         (lambda each: each.drive, label("drive", units.input)),
-        (lambda each: each.rate, label("drive rate", per_second)),
+        (lambda each: each.rate, label("drive rate", per_second(units))),
         (lambda each: each.time, "time (s)"),
         (lambda each: each.measured, label("displacement", units.output)),
     ]
@@ -315,6 +344,36 @@ def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     handles, names = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper right", ncols=4 if wide else 2, markerscale=2)
     return figure
+
+
+def spectrum(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
+    """Spectral density of the residual of the drawn record that judges the model, with the mains."""
+    each, unit = drawn_ones(shown)[-1], fit.parameters.units.output
+    figure = drawing.figure(9.6 if wide else 4.4, 3.8)
+    axes = figure.subplots()
+    found = panels.density(each.time, each.residual)
+    if found is None:
+        axes.text(0.5, 0.5, "fewer than 64 samples in a row", transform=axes.transAxes, ha="center",
+                  color=drawing.QUIET)
+        return figure
+    hertz, values = found
+    drawing.decades(axes, "x", (float(hertz[0]), float(hertz[-1])))
+    axes.plot(hertz, values, color=drawing.RESIDUAL, linewidth=0.9, label="residual")
+    if each.noise is not None:
+        floor = each.noise * np.sqrt(2.0 * each.record.sample_time)
+        axes.axhline(floor, color=drawing.FAULT, linestyle="--", linewidth=1.0, label="noise")
+    drawing.decades(axes, "y")
+    panels.mark_mains(axes, hertz, values)
+    per_root = f"{unit}/\N{SQUARE ROOT}Hz" if unit else None
+    axes.set(xlabel="frequency (Hz)", ylabel=label("residual density", per_root))
+    axes.set_title(f"{each.record.name} ({role(each)})", pad=20)
+    drawing.legend_above(axes)
+    return figure
+
+
+def per_second(units: Units) -> str:
+    """The unit of the drive's rate."""
+    return f"{units.input}/s" if units.input else "1/s"
 
 
 def judged(shown: Sequence[Shown]) -> list[Shown]:
@@ -393,6 +452,6 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
 
 
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Figure]] = {
-    "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
+    "loop": loop, "time": time, "residual": residual, "spectrum": spectrum, "loading": loading, "weights": weights,
 }
 """All figures, by file name."""

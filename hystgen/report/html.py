@@ -1,4 +1,4 @@
-"""A self-contained HTML page: text, tables and figures, without scripts or external files."""
+"""A self-contained HTML page: text, tables and figures, and one script to zoom; no external files."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from hystgen.emission import runtime
+from hystgen.report import viewer
+from hystgen.report.viewer import Viewer
 
 
 @dataclass(frozen=True)
@@ -60,17 +62,37 @@ class Details:
 
 
 @dataclass(frozen=True)
+class Folded:
+    """Blocks that open when their summary is clicked."""
+
+    summary: str
+    blocks: Sequence[Text | HtmlTable]
+    kind: str = "folded"
+
+
+@dataclass(frozen=True)
 class Section:
     """A heading and its content."""
 
     title: str
-    blocks: Sequence[Text | Listing | HtmlTable | Picture | Details]
+    blocks: Sequence[Text | Listing | HtmlTable | Picture | Details | Folded | Viewer]
 
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
-    """The page: `title`, a `lead` with the main result in a few words, and the sections."""
+    """The page: `title`, a `lead` with the main result in a few words, and the sections.
+
+    The page's content security policy allows no script but that of the viewers, known by its hash.
+    """
     template = runtime.environment().overlay(autoescape=True).get_template("report.html.j2")
-    return template.render(title=title, lead=lead, sections=sections, data_uri=_data_uri)
+    zooms = any(isinstance(block, Viewer) for section in sections for block in section.blocks)
+    return template.render(
+        title=title,
+        lead=lead,
+        sections=sections,
+        data_uri=_data_uri,
+        script=Markup(viewer.script()) if zooms else "",
+        script_hash=viewer.script_hash(),
+    )
 
 
 def _data_uri(svg: bytes) -> Markup:

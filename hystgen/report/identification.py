@@ -23,9 +23,10 @@ from hystgen.identification.quality import WORD_COLUMNS, ErrorRow, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, in_units, read_records, several
-from hystgen.report import fit_figures, plots, properties
+from hystgen.report import fit_figures, panels, plots, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
+from hystgen.report.viewer import Viewed, Viewer
 
 PAGE = "report.html"
 
@@ -175,7 +176,8 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> 
         Section("How good it is", _table(fit)),
         Section("Loops", [figures["loop"]]),
         Section("Over time", [figures["time"]]),
-        Section("The residual, and what it depends on", [figures["residual"]]),
+        Section("Zoom and read values", _zoom(fit, shown)),
+        Section("The residual, and what it depends on", [figures["residual"], figures["spectrum"]]),
         Section("Initial loading curve", [figures["loading"]]),
         Section("Thresholds and weights", [figures["weights"]]),
         Section("What was done to the data", _data(shown)),
@@ -185,6 +187,18 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> 
         Section("Parameters", [yaml]),
         Section("Provenance", _provenance(fit, shown)),
     ]
+
+
+def _zoom(fit: Fit, shown: Sequence[Shown]) -> list[Viewer]:
+    units = fit.parameters.units
+    viewed = [
+        Viewed(
+            each.record.name, fit_figures.role(each), each.time, each.drive, each.measured,
+            {"model": np.where(each.used.compared, each.model, np.nan)},
+        )
+        for each in sorted(shown, key=lambda each: not each.used.held_out)
+    ]
+    return [Viewer(viewed, (units.input, units.output), fit_figures.noise_of(fit_figures.judged(shown)))]
 
 
 def _table(fit: Fit) -> list[Text | HtmlTable | Listing]:
@@ -322,16 +336,19 @@ def _errors(shown: Sequence[Shown], fit: Fit) -> str:
 def _loop_caption(fit: Fit, shown: Sequence[Shown]) -> str:
     return (
         "Measured loops and the model's, from a free run over the measured drive with a free offset: "
-        f"{_errors(shown, fit)}. Only compared samples are drawn.{_several(shown)}"
+        f"{_errors(shown, fit)}. Beside each loop, the same samples and the model less the straight line through the "
+        f"measured ones, which enlarges the difference; colours: how fast the drive moves. Only compared samples are "
+        f"drawn.{_several(shown)}"
     )
 
 
 def _loop_alt(fit: Fit, shown: Sequence[Shown]) -> str:
-    return f"Displacement over drive, measured and model: {_errors(shown, fit)}"
+    return f"Displacement over drive, measured and model, and less the straight line: {_errors(shown, fit)}"
 
 
 def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
     said = []
+    drawn: list[str] = []
     for each in fit_figures.drawn_ones(shown):
         skipped, ignored, outliers, stretches, bridged, gaps, left_out = map(len, _masks(each))
         counts = [
@@ -342,15 +359,20 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
         ]
         counts += [counted(stretches, "sample") + " in faulty stretches"] if stretches else []
         counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
+        drawn += ["grey: not compared"] if skipped + ignored + stretches + left_out else []
+        drawn += ["yellow: gaps"] if gaps else []
+        drawn += ["crosses: outliers"] if outliers else []
+        drawn += ["triangles: bridged drive samples"] if bridged else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
-        "Measured and model over time; below, measured minus model where samples were compared. Grey: ignored; yellow: "
-        f"gaps; crosses: outliers. {'; '.join(said)}.{_several(shown)}"
+        "Measured and model over time; below, measured minus model where samples were compared, then the stretch "
+        "with the largest error, shaded, with as much before and behind it, less the record's straight line"
+        f"{''.join(f'; {each}' for each in dict.fromkeys(drawn))}. {'; '.join(said)}.{_several(shown)}"
     )
 
 
 def _time_alt(fit: Fit, shown: Sequence[Shown]) -> str:
-    return f"Displacement over time, measured and model, with the residual below: {_errors(shown, fit)}"
+    return f"Displacement over time, measured and model, residual and worst stretch: {_errors(shown, fit)}"
 
 
 def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
@@ -377,6 +399,22 @@ def _residual_alt(fit: Fit, shown: Sequence[Shown]) -> str:
     unit = f" {fit.unit}" if fit.unit else ""
     peak = max(float(np.nanmax(np.abs(each.residual))) for each in fit_figures.judged(shown))
     return f"Residual against drive, drive rate, time and displacement; the largest is {peak:.3g}{unit}"
+
+
+def _spectrum_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
+    each = fit_figures.drawn_ones(shown)[-1]
+    found = panels.density(each.time, each.residual)
+    if found is None:
+        return "No spectrum: no 64 samples in a row were compared."
+    white = " Dashed: the noise, if it is white." if each.noise is not None else ""
+    return f"Spectral density of the residual.{white} {panels.mains_words(*found)}"
+
+
+def _spectrum_alt(_fit: Fit, shown: Sequence[Shown]) -> str:
+    each = fit_figures.drawn_ones(shown)[-1]
+    found = panels.density(each.time, each.residual)
+    said = f"Spectral density of the residual of {each.record.name} over frequency"
+    return said if found is None else f"{said}. {panels.mains_words(*found)}"
 
 
 def _loading_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
@@ -425,9 +463,10 @@ def _weights_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
 
 
 CAPTIONS = {
-    "loop": _loop_caption, "time": _time_caption, "residual": _residual_caption, "loading": _loading_caption,
-    "weights": _weights_caption,
+    "loop": _loop_caption, "time": _time_caption, "residual": _residual_caption, "spectrum": _spectrum_caption,
+    "loading": _loading_caption, "weights": _weights_caption,
 }
 ALTERNATIVES = {
-    "loop": _loop_alt, "time": _time_alt, "residual": _residual_alt, "loading": _loading_alt, "weights": _weights_alt,
+    "loop": _loop_alt, "time": _time_alt, "residual": _residual_alt, "spectrum": _spectrum_alt, "loading": _loading_alt,
+    "weights": _weights_alt,
 }

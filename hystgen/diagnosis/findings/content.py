@@ -119,7 +119,7 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
 
 REFUSALS = {
     "one_loop": "{value:.0%} of the gap above the noise remains; records of one loop allow at most {limit:.0%}",
-    "little": "on equal terms it removes {value:.3g}{unit} rms, but {limit:.3g}{unit} is needed",
+    "little": "it removes too little: {value:.3g}{unit} rms of the error, but a name needs {limit:.3g}{unit}",
     "chance": "its gain on held-out records may be due to chance (p = {value:.1g}, must be at most {limit:g})",
     "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, must be at most {limit:g})",
     "small": "it removes {value:.0%} of the gap, but a name needs {limit:.0%}",

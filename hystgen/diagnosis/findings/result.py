@@ -240,8 +240,9 @@ class Diagnosis:
     def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Figure:
         """A figure from the report; the default shows how each effect reduces the held-out error.
 
-        `which`: gap, overlay, records, time, against or frequency. Returns a matplotlib Figure, which a notebook
-        displays; with `path`, it is also written to that .png or .svg file. Raises ValueError, PlotError, OSError.
+        `which`: gap, overlay, deviation, records, time, against, frequency, and bode or stops if an effect shows there.
+        Returns a matplotlib Figure, which a notebook displays; with `path`, it is also written to that .png or .svg
+        file. Raises ValueError, PlotError, OSError.
         """
         arguments.choice("which", which, tuple(self.figures))
         return drawing.picture(partial(self.figures[which], self), path)

@@ -89,6 +89,7 @@ class _Creep(Effect):
     name: Literal["creep"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.LINEAR
+    creeps: ClassVar[bool] = True
     shown_by: ClassVar[Mapping[str, int]] = {"holds": 1, "slow_reversals": 1, "settling": 1, "reversals": 1}
     rank: ClassVar[float] = 0
     compensated: ClassVar[Compensated] = "exact"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative
@@ -42,6 +43,10 @@ class Delay(Effect):
     def time_scale(self, drive_range: float) -> float:
         """The delay itself."""
         return self.time
+
+    def response(self, hertz: Array) -> NDArray[np.complex128]:
+        """`exp(-i w T)`."""
+        return np.asarray(np.exp(-2j * np.pi * hertz * self.time))
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive `time` seconds earlier."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative
@@ -34,6 +36,15 @@ class Lag(Effect):
     def time_scale(self, drive_range: float) -> float:
         """The time constant."""
         return self.time_constant
+
+    def response(self, hertz: Array) -> NDArray[np.complex128]:
+        """`1/(1 + i w tau)`."""
+        return np.asarray(1.0 / (1.0 + 2j * np.pi * hertz * self.time_constant))
+
+    @property
+    def corner(self) -> tuple[float, str] | None:
+        """Where the gain has fallen to 0.71."""
+        return (1.0 / (2.0 * math.pi * self.time_constant), "corner") if self.time_constant > 0.0 else None
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen.basics.jit import jit
@@ -80,6 +81,16 @@ class _Mode(Effect):
         zeta = self.damping
         slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
         return 1.0 / (2.0 * math.pi * self.frequency * slow)
+
+    def response(self, hertz: Array) -> NDArray[np.complex128]:
+        """`1/(1 - x^2 + 2 i zeta x)` with `x = f/frequency`."""
+        x = hertz / self.frequency
+        return np.asarray(1.0 / (1.0 - x * x + 2j * self.damping * x))
+
+    @property
+    def corner(self) -> tuple[float, str]:
+        """The undamped frequency."""
+        return self.frequency, "mode"
 
     def factors(self, times: Array) -> tuple[Array, Array, Array]:
         """Times in radians of the undamped oscillation, and the decaying cosine and sine."""
@@ -194,6 +205,10 @@ class PartMode(_Mode):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact: solved for the input with the oscillation known"
     block: ClassVar[OwnBlock] = BLOCK
+
+    def response(self, hertz: Array) -> NDArray[np.complex128]:
+        """The share in the mode, and the rest that follows at once."""
+        return np.asarray(1.0 + self.share * (super().response(hertz) - 1.0))
 
     def numbers(self, seconds: float) -> tuple[float, ...]:
         """The parameters of the block at steps of `seconds`."""
