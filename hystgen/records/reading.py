@@ -8,7 +8,8 @@ import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from json import JSONDecodeError
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.basics.problems import RecordError, counted, printable
+from hystgen.records import calendar
 from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
 from hystgen.records.record import Array, Record
 
@@ -26,6 +28,8 @@ SAME_STEP = 1e-6
 BESIDE = 2
 """[times] Memory needed to read a record, relative to that of its numbers; sorted copies and masks take the rest.
 Measured: 1.7 with 2e7 samples from an HDF5 file (2026-11-26)."""
+
+IN_SECONDS = " in seconds, as it has no unit"
 
 NO_SECONDS = 1e11
 """Times this large are not seconds: seconds since 1970 reach this number in the year 5138, milliseconds did in 1973."""
@@ -85,7 +89,10 @@ class Reading:
 
     `delimiter`: the cell separator, None to infer it from the file; `fills`: for each column with numbers that stand
     for "no value", a phrase naming them; `points`: whether the file may lack a time; `read_as`: interpretations that
-    the file does not state plainly.
+    the file does not state plainly; `channel`: whether the file holds one channel of a record in several files;
+    `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
+    unpacked; `part`: the table, sheet or member that the user names behind the file; `origin`: nanoseconds since year 1
+    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it.
     """
 
     file: str
@@ -99,8 +106,15 @@ class Reading:
     notes: list[str] = field(default_factory=list)
     fills: dict[str, str] = field(default_factory=dict)
     read_as: list[str] = field(default_factory=list)
+    channel: bool = False
+    name: str = ""
+    path: str = ""
+    part: str = ""
+    origin: int | None = None
+    start: str = ""
 
     def __post_init__(self) -> None:
+        self.name, self.path = self.name or Path(self.file).name, self.path or self.file
         if self.delimiter in ("\\t", "tab"):
             self.delimiter = "\t"
 
@@ -118,9 +132,30 @@ class Reading:
         self.problem(text, line)
         return RecordError(self.problems)
 
-    def uninstalled(self, files: str, package: str, others: str = "CSV, .npz or MATLAB .mat (v7)") -> RecordError:
+    def refuse_at(self, text: str, failure: JSONDecodeError, line: int = 0) -> RecordError:
+        """The error to raise for text that is not JSON, in this line, or else in that of the failure."""
+        self.problem(text, line or failure.lineno, failure.colno)
+        return RecordError(self.problems)
+
+    def uninstalled(
+        self, files: str, package: str, others: str = "CSV, .npz or MATLAB .mat (v7)", extra: str = "formats"
+    ) -> RecordError:
         """The error to raise for files whose package is not installed; `others`: formats that do not need it."""
-        return self.refuse(f"{files} files need the package {package}; {extras.install('formats')}, or export {others}")
+        return self.refuse(f"{files} files need the package {package}; {extras.install(extra)}, or export {others}")
+
+    def take_part(self, what: str, names: Sequence[str], advice: str = "name one behind the file") -> str:
+        """The one of several tables in a file that is to be read: the only one, or the one that the user names.
+
+        Raises RecordError with all names if it is not clear which.
+        """
+        if self.part in names or (len(names) == 1 and not self.part):
+            return self.part or names[0]
+        if not names:
+            raise self.refuse(f"has no {what}s")
+        shown = ", ".join(map(printable, names[:LISTED])) + (f" and {len(names) - LISTED} more" * (len(names) > LISTED))
+        base = self.file.removesuffix(f"/{self.part}") if self.part else self.file
+        wrong = f"no {what} {printable(self.part)} among" if self.part else f"{len(names)} {what}s:"
+        raise self.refuse(f"has {wrong} {shown}; {advice}, as in {base}/{printable(names[-1])}")
 
     def refuse_if_any(self) -> None:
         """Raise RecordError with the problems found so far, if any."""
@@ -152,13 +187,14 @@ class Reading:
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None, steps, self.points)
+        found = finder.find(self.need, self.sample_time is not None, steps, self.points, self.channel)
         for text in finder.problems:
             self.problem(text, line)
-        steps = finder.steps
-        if len({step.start for step in steps}) > 1:
-            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
+        if len({step.start for step in finder.stated}) > 1:
+            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in finder.stated)
             self.problem(f"the columns start at different times: {starts}; export them with a common time", line)
+        steps = finder.steps
+        self.start = next((step.start for step in finder.stated), "")
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, but the file has {said}; give --sample-time", line)
@@ -167,7 +203,7 @@ class Reading:
             no_unit = "t" in finder.understood and not found["t"].unit
             self.understood(
                 ", ".join(
-                    f"{ours} = {printable(c.own)}{' in seconds, as it has no unit' if ours == 't' and no_unit else ''}"
+                    f"{ours} = {printable(c.own)}{IN_SECONDS if ours == 't' and no_unit else ''}"
                     for ours, c in sorted(found.items(), key=lambda entry: (*STANDARD, entry[0]).index(entry[0]))
                 )
             )
@@ -207,13 +243,15 @@ class Reading:
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
-            columns, ignored = self._of_matrix(name, shape, read), [other for other in ignored if other != name]
+            steps = [replace(step, of="") if step.of == name else step for step in steps]
+            columns = self._of_matrix(name, shape, read, steps)
+            ignored = [each for each in ignored if each != name]
         chosen = self.chosen(columns, ignored, outside, steps=steps)
-        lengths = {c.length for c in chosen.values()}
+        lengths = {c.length for c in chosen.values()} or {max((c.length for c in columns), default=0)}
         if len(lengths) > 1:
             parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
             raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
-        folders = {c.folder for c in chosen.values()}
+        folders = {c.folder for c in chosen.values()} or {c.folder for c in columns}
         self.left_out("without numbers", ignored)
         self.left_out("stored outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
@@ -228,11 +266,19 @@ class Reading:
             numbers[name] = np.require(c.read(), np.float64, ("C", "W"))
         return self.finished(numbers, taken)
 
-    def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]]) -> list[Column]:
+    def address(self, c: Column) -> str:
+        """How to refer to a column in `--columns`: as the user did, or by its name."""
+        return self.columns.get("t", "").partition(" [")[0] or printable(c.name)
+
+    def _of_matrix(
+        self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]], steps: Sequence[Step]
+    ) -> list[Column]:
         """The columns of a matrix. Raises RecordError unless the user names them by number."""
         width = in_matrix(shape)
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
-            example = "1,2 (drive, measured) with --sample-time" if width == 2 else "1,2,3 (time, drive, measured)"
+            example = "1,2,3 (time, drive, measured)"
+            if width == 2 or steps:
+                example = f"1,2 (drive, measured){'' if steps else ' with --sample-time'}"
             raise self.refuse(
                 f"{printable(name)} is a matrix of {width} columns; say which they are with --columns {example}"
             )
@@ -253,11 +299,21 @@ class Reading:
             x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
-            name = printable(taken["t"].own)
             raise self.refuse(
-                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after its '
-                f'name, "{name} [ms]"'
+                f'the numbers of "{printable(taken["t"].own)}" are too large to be seconds, and it has no unit; give '
+                f'one, --columns "t={self.address(taken["t"])} [ms]" for milliseconds, or write it after its name'
             )
+        if "t" in numbers and "t" not in units and (counts := calendar.counted_days(numbers["t"], taken["t"].own)):
+            if counts == calendar.DOUBTFUL:
+                address = self.address(taken["t"])
+                raise self.refuse(
+                    f'the numbers of "{printable(taken["t"].own)}", from {numbers["t"][0]:.10g} on, may be seconds or '
+                    f'days since 1900, and it has no unit; give it one, --columns "t={address} [d]" for days or '
+                    f'--columns "t={address} [s]" for seconds'
+                )
+            self.read_as = [said.replace(IN_SECONDS, "") for said in self.read_as]
+            self.understood(counts)
+            units["t"] = "d"
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])
             if note:
@@ -268,6 +324,32 @@ class Reading:
 
 MOST_TOGETHER = 64
 """Largest number of columns in a matrix that may be a record; a wider one is an image or a map."""
+
+
+def without_masked(numbers: NDArray[np.generic], attributes: Mapping[str, object]) -> NDArray[np.float64]:
+    """Numbers as the attributes of netCDF's conventions say: NaN for fill values and for those outside the valid range,
+    then scaled."""
+
+    def of(*names: str) -> NDArray[np.float64]:
+        found = [np.ravel(np.asarray(attributes[name])) for name in names if name in attributes]
+        return np.concatenate([each for each in found if each.dtype.kind in "fiub"] or [np.empty(0)]).astype(np.float64)
+
+    x = np.asarray(numbers, dtype=np.float64)
+    low, high = of("valid_min"), of("valid_max")
+    span = of("valid_range")
+    if len(span) == 2:
+        low, high = span[:1], span[1:]
+    wrong = np.isin(x, of("_FillValue", "missing_value"))
+    for ends, outside in ((low, np.less), (high, np.greater)):
+        if len(ends):
+            wrong |= outside(x, ends[0])
+    x = np.where(wrong, np.nan, x)
+    factor, offset = of("scale_factor"), of("add_offset")
+    if len(factor) == 1:
+        x *= factor[0]
+    if len(offset) == 1:
+        x += offset[0]
+    return x
 
 
 def in_matrix(shape: tuple[int, ...]) -> int:
@@ -353,8 +435,8 @@ def repaired(reading: Reading, table: Table) -> Record:
         t = np.arange(samples, dtype=np.float64) * step
     v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
     y = columns.pop("y", None)
-    name, read_as = Path(reading.file).name, "; ".join(reading.read_as)
-    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
+    read_as = "; ".join(reading.read_as)
+    return Record(reading.name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:

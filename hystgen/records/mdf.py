@@ -1,0 +1,47 @@
+"""Measurements of vehicles and test benches (`.mf4`, `.mdf`), read with asammdf: channels in groups, each group with a
+time of its own."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.records.columns import Column
+from hystgen.records.reading import Reading, Table
+
+
+def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
+    """Read an MDF file of version 3 or 4: its numeric channels; samples marked invalid become NaN."""
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise reading.uninstalled("MDF", "asammdf", "CSV", "instruments") from None
+    with reading.parsing("an MDF file"), MDF(reading.path) as file:
+        columns: list[Column] = []
+        ignored: list[str] = []
+        groups: Any = file.groups  # of one of two classes, by the version
+        many = sum(group.channel_group.cycles_nr > 1 for group in groups) > 1
+        for number, group in enumerate(groups):
+            folder = f"{number}/" if many else ""
+            length = int(group.channel_group.cycles_nr)
+            master = file.masters_db.get(number)
+            for place, channel in enumerate(group.channels):
+                first = file.get(group=number, index=place, record_count=1, ignore_invalidation_bits=True)
+                if length < 2 or first.samples.dtype.kind not in "fiub" or first.samples.ndim != 1:
+                    ignored.append(folder + channel.name)
+                    continue
+                unit = str(first.unit or "") or ("s" if place == master else "")
+                read = partial(_samples, file, number, place)
+                columns.append(Column(channel.name, folder, unit, length, read))
+        return reading.table(columns, ignored)
+
+
+def _samples(file: Any, group: int, place: int) -> NDArray[np.float64]:
+    signal = file.get(group=group, index=place, ignore_invalidation_bits=True)
+    numbers = np.array(signal.samples, dtype=np.float64)
+    if signal.invalidation_bits is not None:
+        numbers[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+    return numbers
