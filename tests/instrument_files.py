@@ -57,7 +57,7 @@ def zipped(members: dict[str, bytes]) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():
-            archive.writestr(name, data)
+            archive.writestr(name, data, zipfile.ZIP_STORED if name == "mimetype" else None)
     return file.getvalue()
 
 
@@ -234,6 +234,8 @@ def rows_of_hdf5(path: Path) -> None:
 
 
 def mat_element(kind: int, data: bytes) -> bytes:
+    if 0 < len(data) <= 4:  # in its own tag, as MATLAB does
+        return struct.pack("<HH", kind, len(data)) + data.ljust(4, b"\0")
     return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
 
 
@@ -507,3 +509,33 @@ def matlab_dates(path: Path) -> None:
     start = dt.datetime(2024, 3, 5, 23, 59, 59, 950000)
     cells = [(start + dt.timedelta(seconds=float(t))).strftime("%d-%b-%Y %H:%M:%S.%f") for t in T]
     path.write_text(csv_text(("Time", "v", "y"), (cells, V, Y)))
+
+
+# Odd files ------------------------------------------------------------------------------------------------------------
+
+
+def packed_often(times: int) -> bytes:
+    data = csv_text().encode()
+    for _ in range(times):
+        data = gzip.compress(data)
+    return data
+
+
+def pickled() -> bytes:
+    file = io.BytesIO()
+    np.save(file, np.array({"t": T}, dtype=object), allow_pickle=True)
+    return file.getvalue()
+
+
+def vector(data: Array) -> bytes:
+    file = io.BytesIO()
+    np.save(file, data)
+    return file.getvalue()
+
+
+def with_password(archive: bytes) -> bytes:
+    """The flag of an encrypted member set in both of its headers."""
+    data = bytearray(archive)
+    data[6] |= 1
+    data[data.index(b"PK\1\2") + 8] |= 1
+    return bytes(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import IO, TYPE_CHECKING
@@ -146,7 +147,10 @@ def _listed(stream: IO[bytes]) -> list[tuple[str, tuple[int, ...], str]]:
     """Variables with their shapes and classes, of a file with objects, which scipy cannot list."""
     from scipy.io import loadmat
 
-    found = {name: x for name, x in loadmat(stream).items() if isinstance(x, np.ndarray) and not name.startswith("__")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # all objects have the same name
+        everything = loadmat(stream)
+    found = {name: x for name, x in everything.items() if isinstance(x, np.ndarray) and not name.startswith("__")}
     kinds = {
         name: "double" if x.dtype.kind in "fiub" else "struct" if x.dtype.names else "" for name, x in found.items()
     }

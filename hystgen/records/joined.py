@@ -73,7 +73,7 @@ def joined(reading: Reading, channels: Sequence[Reading], tables: Sequence[Table
                 unit = table.units.get(column, "")
                 columns.append(Column(column, f"{name}/", unit, len(numbers), partial(np.array, numbers)))
     reading.columns = _in_order(reading, columns, len(names))
-    return reading.table(columns, [])
+    return reading.table(columns, [], together=True)
 
 
 def _each(names: Sequence[str], of: Sequence[object]) -> str:

@@ -19,7 +19,11 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         from asammdf import MDF
     except ImportError:
         raise reading.uninstalled("MDF", "asammdf", "CSV", "instruments") from None
-    with reading.parsing("an MDF file"), MDF(reading.path) as file:
+    try:
+        opened = MDF(reading.path)
+    except Exception:  # of any type, with a text about the library's own objects
+        raise reading.refuse("is an MDF file that is damaged or cut off; export it again") from None
+    with reading.parsing("an MDF file"), opened as file:
         columns: list[Column] = []
         ignored: list[str] = []
         groups: Any = file.groups  # of one of two classes, by the version

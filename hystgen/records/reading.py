@@ -188,6 +188,8 @@ class Reading:
         """
         finder = Finder(columns, self.columns, ignored, outside)
         found = finder.find(self.need, self.sample_time is not None, steps, self.points, self.channel)
+        if finder.problems:
+            self._check_lengths(found)
         for text in finder.problems:
             self.problem(text, line)
         if len({step.start for step in finder.stated}) > 1:
@@ -212,6 +214,12 @@ class Reading:
             self.understood(f"time from {steps[0].said}")
         return found
 
+    def _check_lengths(self, chosen: Mapping[str, Column]) -> None:
+        """Raise RecordError if columns differ in length."""
+        if len({c.length for c in chosen.values()}) > 1:
+            parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
+            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
+
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
         """The columns not requested, keyed by the names they get; a column whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
@@ -234,12 +242,14 @@ class Reading:
         outside: Sequence[str] = (),
         steps: Sequence[Step] = (),
         matrices: Mapping[str, Matrix] = MappingProxyType({}),
+        together: bool = False,
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
         The table has the requested columns and, from the groups that hold them, all others of the same length, except
         those that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`:
-        shapes and readers by name; in a file without vectors, a single matrix is the record.
+        shapes and readers by name; in a file without vectors, a single matrix is the record. `together`: the groups
+        form one record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
@@ -247,11 +257,9 @@ class Reading:
             columns = self._of_matrix(name, shape, read, steps)
             ignored = [each for each in ignored if each != name]
         chosen = self.chosen(columns, ignored, outside, steps=steps)
+        self._check_lengths(chosen)
         lengths = {c.length for c in chosen.values()} or {max((c.length for c in columns), default=0)}
-        if len(lengths) > 1:
-            parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
-            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
-        folders = {c.folder for c in chosen.values()} or {c.folder for c in columns}
+        folders = {c.folder for c in (columns if together or not chosen else chosen.values())}
         self.left_out("without numbers", ignored)
         self.left_out("stored outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
@@ -473,10 +481,15 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     row = int(rows[int(np.argmin(steps)) + 1])
     given = reading.sample_time
     if given is None:
-        mean = float(t[rows[-1]] - t[rows[0]]) / float(rows[-1] - rows[0])
+        # Between two changes of the written time, the samples are counted to one; the ends of the record are not changes
+        rises = np.flatnonzero(steps > 0.0) + 1
+        first, last = (rises[0], rises[-1]) if len(rises) > 1 else (0, -1)
+        span = float(t[rows[last]] - t[rows[first]])
+        mean = span / float(rows[last] - rows[first])
+        digits = 3 + max(0, math.ceil(math.log10(span / finest)))  # so that over the record it is off by a small part
         reading.problem(
             f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, because it was written in "
-            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
+            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.{digits}g}), or export it with more digits",
             table.line(row),
         )
         return t
