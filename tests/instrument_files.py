@@ -322,7 +322,8 @@ def universal(binary: int) -> Callable[[Path], None]:
             made = {
                 "type": 58, "binary": binary, "func_type": 1, "rsp_node": node, "rsp_dir": 3, "ref_node": 0,
                 "ref_dir": 0, "data": x, "x": T, "id1": "run 3", "rsp_ent_name": "NONE", "ref_ent_name": "NONE",
-                "ver_num": 0, "load_case_id": 0, "abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": STEP, "z_axis_value": 0,
+                "ver_num": 0, "load_case_id": 0, "abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": STEP,
+                "z_axis_value": 0,
                 "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 8, "orddenom_spec_data_type": 0,
                 "ordinate_axis_lab": label, "ordinate_axis_units_lab": unit, "abscissa_axis_lab": "Time",
                 "abscissa_axis_units_lab": "s", "ord_data_type": 4,

@@ -131,7 +131,7 @@ def provoked(case: Case, folder: Path) -> tuple[str, str]:
 
 def advised(case: Case, source: str, said: str) -> list[Record]:
     """The record, read with the options that the message names."""
-    found = [match for match in OPTIONS.finditer(said)]
+    found = list(OPTIONS.finditer(said))
     options: dict[str, Any] = dict(case.options)
     if found:
         match = found[min(case.which, len(found) - 1)]
@@ -184,8 +184,8 @@ def test_every_advice_is_tried(tmp_path: Path) -> None:
         patterns = {id(arg) for node in ast.walk(tree) if isinstance(node, ast.Call) for arg in node.args
                     if isinstance(node.func, ast.Attribute) and node.func.attr in ("compile", "sub")}  # fmt: skip
         for node in ast.walk(tree):
-            if isinstance(node, ast.Constant) and id(node) not in docs | patterns and isinstance(node.value, str):
-                if re.search(r"--[a-z]", node.value):
-                    pieces.add(node.value)
+            text_ = getattr(node, "value", None) if isinstance(node, ast.Constant) else None
+            if isinstance(text_, str) and id(node) not in docs | patterns and re.search(r"--[a-z]", text_):
+                pieces.add(text_)
     assert len(pieces) > 15
     assert [piece for piece in sorted(pieces) if not any(piece in each for each in said)] == []

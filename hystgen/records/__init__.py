@@ -166,7 +166,8 @@ def files(source: object) -> list[str]:
     """The paths of the files that a record is read from; none for samples in memory."""
     if not isinstance(source, str | os.PathLike):
         return []
-    return [packed.location(each)[0] for each in joined.files(os.fspath(source))]
+    path = os.fspath(source)
+    return [packed.location(each)[0] for each in (joined.files(path) if joined.MARK in path else [path])]
 
 
 def stem(source: str) -> str:
@@ -190,10 +191,10 @@ def _read(
     if sample_time is not None and not (0.0 < sample_time < float("inf")):
         reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
     reading.refuse_if_any()
-    channels = joined.files(file)
-    reading.name = " + ".join(os.path.basename(each) for each in channels)
+    channels = joined.files(file) if joined.MARK in file else [file]
     if len(channels) == 1:
         return repaired(reading, _table(reading))
+    reading.name = " + ".join(os.path.basename(each) for each in channels)
     times = {"t": reading.columns["t"]} if "t" in reading.columns else {}
     parts = [Reading(each, times, sample_time, delimiter, (), tick, channel=True) for each in channels]
     tables, refused = [], []
@@ -224,8 +225,7 @@ def _size(source: Source) -> int:
     """Bytes to read; 0 for a missing file, which is reported when it is opened."""
     if not isinstance(source, str | os.PathLike):
         return 0
-    paths = [packed.location(each)[0] for each in joined.files(os.fspath(source))]
-    return sum(os.stat(path).st_size for path in paths if os.path.exists(path))
+    return sum(os.stat(path).st_size for path in files(source) if os.path.exists(path))
 
 
 MARK = joined.MARK

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hystgen.records import mat_objects
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
 from hystgen.records.columns import Column, Step, from_number, is_named
-from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension, without_masked
+from hystgen.records.reading import MASKING, Matrix, Reading, Table, in_matrix, one_dimension, without_masked
 
 if TYPE_CHECKING:
     import h5py
@@ -89,8 +89,8 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 columns.append(Column(name, folder, unit, length, partial(_vector, reading, found)))
             elif matlab and "MATLAB_object_decode" in found.attrs:
                 objects[folder + name] = _class(found)
-            elif not matlab and found.dtype.names and one_dimension(found.shape or ()):
-                columns.extend(_of_rows(found, f"{folder}{name}/"))
+            elif not matlab and (fields := _of_rows(found, f"{folder}{name}/")):
+                columns.extend(fields)
             elif (step := _scalar(found, name, folder, matlab)) is not None:
                 steps.append(step)
             else:
@@ -115,6 +115,8 @@ def _class(dataset: h5py.Dataset) -> str:
 
 def _of_rows(dataset: h5py.Dataset, folder: str) -> list[Column]:
     """The fields of a dataset of rows that are numbers."""
+    if not dataset.dtype.names or not one_dimension(dataset.shape or ()):
+        return []
     kinds = {name: dataset.dtype[name] for name in dataset.dtype.names}
     return [
         Column(name, folder, "", dataset.size, lambda name=name: np.array(dataset[name], np.float64).ravel())  # type: ignore[misc]
@@ -214,7 +216,7 @@ def _vector(reading: Reading, dataset: h5py.Dataset) -> NDArray[np.float64]:
     chunk = dataset.chunks[axis] if dataset.chunks else 1
     step = chunk * max(1, SLICE // chunk)
     numbers = np.empty(length, dtype=np.float64)
-    masked = len(dataset.attrs) > 0 and "MATLAB_class" not in dataset.attrs
+    masked = any(name in dataset.attrs for name in MASKING)
     for start in range(0, length, step):
         where: list[int | slice] = [0] * dataset.ndim
         where[axis] = slice(start, start + step)

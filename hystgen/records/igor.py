@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from functools import partial
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.records.columns import Column, Step, is_time_unit
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix
@@ -49,12 +50,12 @@ def _text(raw: object) -> str:
     return raw.split(b"\0")[0].decode("latin-1").strip() if isinstance(raw, bytes) else ""
 
 
-def _steps(head: Any, name: str) -> list[Step]:
+def _steps(head: Mapping[str, ArrayLike], name: str) -> list[Step]:
     """The sample time from the scaling of the rows, if that is a time."""
     if "sfA" in head:
         step, units = float(np.ravel(head["sfA"])[0]), _text(np.asarray(head["dimUnits"])[0])
     else:
-        step, units = float(head["hsA"]), _text(head["xUnits"])
+        step, units = float(np.ravel(head["hsA"])[0]), _text(head["xUnits"])
     if not is_time_unit(units) or not 0.0 < step < float("inf"):
         return []
     return [Step(step, f"scaling {step:g} {units} ({name})")] if units == "s" else []

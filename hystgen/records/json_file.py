@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import partial
-from typing import IO, Any
+from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from hystgen.records.cells import Clock, is_time
 from hystgen.records.columns import Column, Step, from_number, is_named
 from hystgen.records.csv_file import texts
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
+
+Json: TypeAlias = object
+"""A value of JSON."""
 
 _NAMES = ("name", "label", "id", "channel")
 _UNITS = ("unit", "units")
@@ -29,7 +32,7 @@ DEEPEST = 16
 def read_json(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a JSON file: objects of columns, at any level, lists of samples, or one sample a line."""
     text = "".join(texts(reading, stream))
-    found = _Found()
+    found = _Contents()
     try:
         found.add(_parsed(reading, text), "", 0)
     except RecursionError:
@@ -39,7 +42,7 @@ def read_json(reading: Reading, stream: IO[bytes]) -> Table:
     return reading.table(found.columns, found.ignored, steps=found.steps, matrices=found.matrices)
 
 
-def _parsed(reading: Reading, text: str) -> Any:
+def _parsed(reading: Reading, text: str) -> Json:
     """The content of a file, with the samples of JSON lines in a list."""
     try:
         return json.loads(text)
@@ -58,7 +61,7 @@ def _parsed(reading: Reading, text: str) -> Any:
     return samples
 
 
-class _Found:
+class _Contents:
     """The columns in a JSON value, and what is left out."""
 
     def __init__(self) -> None:
@@ -69,7 +72,7 @@ class _Found:
         self.notes: list[str] = []
         self.origin: int | None = None
 
-    def add(self, value: Any, folder: str, depth: int, unit: str = "") -> None:
+    def add(self, value: Json, folder: str, depth: int, unit: str = "") -> None:
         """Add the columns in a value; `folder`: the names of the objects around it, each with a slash."""
         name = folder[:-1].rpartition("/")[2]
         above = folder[: len(folder) - len(name) - 1] if name else ""
@@ -85,26 +88,28 @@ class _Found:
         else:
             self._array(value, name or "data", above, unit)
 
-    def _object(self, value: Mapping[str, Any], folder: str, depth: int) -> None:
-        names = next((value[key] for key in _COLUMNS if _are_names(value.get(key))), None)
-        rows = next((value[key] for key in _ROWS if isinstance(value.get(key), list)), None)
+    def _object(self, value: Mapping[str, Json], folder: str, depth: int) -> None:
+        lists = {key: each for key, each in value.items() if isinstance(each, list)}
+        names = next((lists[key] for key in _COLUMNS if _are_names(lists.get(key))), None)
+        rows = next((lists[key] for key in _ROWS if key in lists), None)
         if names and rows and isinstance(rows[0], list) and len(rows[0]) == len(names):
             self._rows(names, rows, folder)
             return
         if value and all(key.isdecimal() for key in value):  # a data frame's column by row number
             self.add(list(value.values()), folder, depth + 1)
             return
-        units: Any = value.get("units") if isinstance(value.get("units"), Mapping) else {}
-        numbers = next((value[key] for key in _VALUES if isinstance(value.get(key), list)), None)
-        unit = next((value[key] for key in _UNITS if isinstance(value.get(key), str)), "")
+        given = value.get("units")
+        units = given if isinstance(given, Mapping) else {}
+        numbers = next((lists[key] for key in _VALUES if key in lists), None)
+        unit = next((each for key in _UNITS if isinstance(each := value.get(key), str)), "")
         if folder and unit and numbers is not None:
             self.add(numbers, folder, depth + 1, unit)
             return
         for key, each in value.items():
-            if each is not units:
+            if each is not given or given is not units:
                 self.add(each, f"{folder}{key}/", depth + 1, str(units.get(key, "")))
 
-    def _objects(self, samples: list[Mapping[str, Any]], folder: str, depth: int) -> None:
+    def _objects(self, samples: list[Mapping[str, Json]], folder: str, depth: int) -> None:
         """The columns in a list of samples, or of channels that each have a name and values."""
         name = next((key for key in _NAMES if all(isinstance(each.get(key), str) for each in samples)), None)
         held = next((key for key in _VALUES if all(isinstance(each.get(key), list) for each in samples)), None)
@@ -123,12 +128,12 @@ class _Found:
             else:
                 self.add(column, f"{folder}{key}/", depth + 1)
 
-    def _rows(self, names: list[Any], rows: list[Any], folder: str) -> None:
+    def _rows(self, names: list[Json], rows: list[Json], folder: str) -> None:
         for k, name in enumerate(names):
             cells = [row[k] if isinstance(row, list) and len(row) > k else None for row in rows]
             self.add(cells, f"{folder}{name}/", DEEPEST)
 
-    def _array(self, value: Any, name: str, folder: str, unit: str) -> None:
+    def _array(self, value: Json, name: str, folder: str, unit: str) -> None:
         numbers = _numbers(value)
         if numbers is None and isinstance(value, list) and value and _are_times(value):
             numbers, unit = self._times(value, name), "s"
@@ -149,15 +154,15 @@ class _Found:
         return np.array(seconds)
 
 
-def _are_names(value: Any) -> bool:
+def _are_names(value: Json) -> bool:
     return isinstance(value, list) and len(value) > 1 and all(isinstance(each, str) for each in value)
 
 
-def _are_times(value: list[Any]) -> bool:
+def _are_times(value: list[Json]) -> bool:
     return all(each is None or (isinstance(each, str) and is_time(each)) for each in value) and value[0] is not None
 
 
-def _numbers(value: Any) -> NDArray[np.float64] | None:
+def _numbers(value: Json) -> NDArray[np.float64] | None:
     """An array of numbers with NaN for null, true and false as 1 and 0; None for anything else."""
     if not isinstance(value, list) or any(isinstance(each, str) for each in value):
         return None

@@ -3,14 +3,28 @@ time of its own."""
 
 from __future__ import annotations
 
+import gc
+import sys
+from collections.abc import Callable
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.records.columns import Column
 from hystgen.records.reading import Reading, Table
+
+if TYPE_CHECKING:
+    from asammdf import MDF
+    from asammdf.blocks.v4_blocks import Channel, ChannelGroup
+
+    class _Group(Protocol):
+        channel_group: ChannelGroup
+        channels: list[Channel]
+
+
+File = TypeVar("File")
 
 
 def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
@@ -19,14 +33,12 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         from asammdf import MDF
     except ImportError:
         raise reading.uninstalled("MDF", "asammdf", "CSV", "instruments") from None
-    try:
-        opened = MDF(reading.path)
-    except Exception:  # of any type, with a text about the library's own objects
-        raise reading.refuse("is an MDF file that is damaged or cut off; export it again") from None
+    if (opened := _opened(MDF, reading.path)) is None:
+        raise reading.refuse("is an MDF file that is damaged or cut off; export it again")
     with reading.parsing("an MDF file"), opened as file:
         columns: list[Column] = []
         ignored: list[str] = []
-        groups: Any = file.groups  # of one of two classes, by the version
+        groups = cast("list[_Group]", file.groups)  # of one of two classes, by the version
         many = sum(group.channel_group.cycles_nr > 1 for group in groups) > 1
         for number, group in enumerate(groups):
             folder = f"{number}/" if many else ""
@@ -43,7 +55,19 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         return reading.table(columns, ignored)
 
 
-def _samples(file: Any, group: int, place: int) -> NDArray[np.float64]:
+def _opened(library: Callable[[str], File], path: str) -> File | None:
+    """The file; None if it is damaged, where the library's object fails again on deletion, here in silence."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        return library(path)
+    except Exception:  # of any type, with a text about the library's own objects
+        return None
+    finally:
+        gc.collect()
+        sys.unraisablehook = hook
+
+
+def _samples(file: MDF, group: int, place: int) -> NDArray[np.float64]:
     signal = file.get(group=group, index=place, ignore_invalidation_bits=True)
     numbers = np.array(signal.samples, dtype=np.float64)
     if signal.invalidation_bits is not None:

@@ -82,7 +82,7 @@ def read(
 
 def _as_call(problem: str) -> str:
     """A message about a file, reworded to name arguments of a call instead of options."""
-    problem = re.sub("name the files of .* with --join DRIVE MEASURED", "give the drive and the measured signal", problem)
+    problem = re.sub("name the files .* with --join DRIVE MEASURED", "give the drive and the measured signal", problem)
 
     def argument(option: re.Match[str]) -> str:
         if option[1] is None:

@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import PurePosixPath
-from typing import IO, Any, cast
+from typing import IO, cast
 
 from hystgen.records.reading import CountingFile, Reading
 
@@ -31,10 +31,12 @@ PIECE = 1 << 20
 ROOM = 0.5
 """Largest share of the free disk space that an unpacked file may take: a few kilobytes can unpack to terabytes."""
 
-STREAMS: Mapping[bytes, tuple[str, Callable[[Any], Any]]] = {
-    b"\x1f\x8b": ("gzip", gzip.open),
-    b"\xfd7zXZ\0": ("xz", lzma.open),
-    b"BZh": ("bzip2", bz2.open),
+Opener = Callable[[IO[bytes]], IO[bytes]]
+
+STREAMS: Mapping[bytes, tuple[str, Opener]] = {
+    b"\x1f\x8b": ("gzip", cast(Opener, gzip.open)),
+    b"\xfd7zXZ\0": ("xz", cast(Opener, lzma.open)),
+    b"BZh": ("bzip2", cast(Opener, bz2.open)),
 }
 """Packed streams by their first bytes: name, and a function that opens them."""
 
@@ -84,7 +86,7 @@ def opened(reading: Reading, stack: ExitStack) -> tuple[IO[bytes], bytes, str]:
         if found is not None:
             name = name[: -len(PurePosixPath(name).suffix)] if PurePosixPath(name).suffix.lower() in PACKED else name
             stream = _unpacked(reading, stack, found[0], lambda stream=stream, found=found: found[1](stream))  # type: ignore[misc]
-        elif start.startswith(b"PK\x03\x04") and (listed := _zipped(stack, stream)) is not None:
+        elif start.startswith(b"PK\x03\x04") and (listed := _zipped(stack, stream, name)) is not None:
             name, stream = _member(reading, stack, "zip", listed)
         elif start[257:262] == b"ustar":
             name, stream = _member(reading, stack, "tar", _tarred(reading, stack, stream))
@@ -97,8 +99,10 @@ Members = Mapping[str, Callable[[], IO[bytes]]]
 """Files in an archive, and how to open each."""
 
 
-def _zipped(stack: ExitStack, stream: IO[bytes]) -> Members | None:
+def _zipped(stack: ExitStack, stream: IO[bytes], name: str) -> Members | None:
     """The files in a zip archive; None for a file that only is one inside: an `.npz`, a workbook."""
+    if name.lower().endswith(".npz"):
+        return None
     try:
         archive = stack.enter_context(zipfile.ZipFile(stream))
         names = archive.namelist()

@@ -18,8 +18,17 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.basics.problems import RecordError, counted, printable
-from hystgen.records import calendar
-from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
+from hystgen.records.columns import (
+    DOUBTFUL,
+    LISTED,
+    STANDARD,
+    Column,
+    Finder,
+    Step,
+    counted_days,
+    further_names,
+    to_seconds,
+)
 from hystgen.records.record import Array, Record
 
 SAME_STEP = 1e-6
@@ -311,8 +320,8 @@ class Reading:
                 f'the numbers of "{printable(taken["t"].own)}" are too large to be seconds, and it has no unit; give '
                 f'one, --columns "t={self.address(taken["t"])} [ms]" for milliseconds, or write it after its name'
             )
-        if "t" in numbers and "t" not in units and (counts := calendar.counted_days(numbers["t"], taken["t"].own)):
-            if counts == calendar.DOUBTFUL:
+        if "t" in numbers and "t" not in units and (counts := counted_days(numbers["t"], taken["t"].own)):
+            if counts == DOUBTFUL:
                 address = self.address(taken["t"])
                 raise self.refuse(
                     f'the numbers of "{printable(taken["t"].own)}", from {numbers["t"][0]:.10g} on, may be seconds or '
@@ -334,9 +343,15 @@ MOST_TOGETHER = 64
 """Largest number of columns in a matrix that may be a record; a wider one is an image or a map."""
 
 
+MASKING = ("_FillValue", "missing_value", "valid_min", "valid_max", "valid_range", "scale_factor", "add_offset")
+"""Attributes by which stored numbers differ from those meant."""
+
+
 def without_masked(numbers: NDArray[np.generic], attributes: Mapping[str, object]) -> NDArray[np.float64]:
     """Numbers as the attributes of netCDF's conventions say: NaN for fill values and for those outside the valid range,
-    then scaled."""
+    then scaled; unchanged without such attributes."""
+    if not any(name in attributes for name in MASKING):
+        return np.asarray(numbers, dtype=np.float64)
 
     def of(*names: str) -> NDArray[np.float64]:
         found = [np.ravel(np.asarray(attributes[name])) for name in names if name in attributes]
@@ -481,7 +496,7 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     row = int(rows[int(np.argmin(steps)) + 1])
     given = reading.sample_time
     if given is None:
-        # Between two changes of the written time, the samples are counted to one; the ends of the record are not changes
+        # Between two changes of the written time, samples are counted to one; the record does not end at a change
         rises = np.flatnonzero(steps > 0.0) + 1
         first, last = (rises[0], rises[-1]) if len(rises) > 1 else (0, -1)
         span = float(t[rows[last]] - t[rows[first]])
@@ -489,7 +504,8 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
         digits = 3 + max(0, math.ceil(math.log10(span / finest)))  # so that over the record it is off by a small part
         reading.problem(
             f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, because it was written in "
-            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.{digits}g}), or export it with more digits",
+            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.{digits}g}), or export it with more "
+            "digits",
             table.line(row),
         )
         return t

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from datetime import date, datetime, time, timedelta
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 from hystgen.records.csv_file import read_text
 from hystgen.records.reading import Reading, Table
+
+if TYPE_CHECKING:
+    from openpyxl.cell import Cell
+    from openpyxl.worksheet.worksheet import Worksheet
 
 FEWEST = 2
 """[rows] A sheet with fewer rows of at least two numbers has no record: it is a title page or a list of settings."""
@@ -49,7 +53,7 @@ def read_xlsx(reading: Reading, stream: IO[bytes]) -> Table:
     return read_text(reading, iter(["\n".join(lines) + "\n"]), 0)
 
 
-def _rows(sheet: Any, late: int) -> Iterator[list[str]]:
+def _rows(sheet: Worksheet, late: int) -> Iterator[list[str]]:
     """The rows of a sheet as text, without the empty cells at their ends."""
     for row in sheet.iter_rows():
         cells = [_text(cell, late) for cell in row]
@@ -58,7 +62,7 @@ def _rows(sheet: Any, late: int) -> Iterator[list[str]]:
         yield cells
 
 
-def _text(cell: Any, late: int) -> str:
+def _text(cell: Cell, late: int) -> str:
     """A cell as text: numbers with all their digits, times as in ISO 8601."""
     value = cell.value
     if value is None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
+from collections.abc import Mapping
 from functools import partial
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hystgen.records.columns import Column, Step
 from hystgen.records.reading import Reading, Table
+
+Dataset = Mapping[str, ArrayLike]
+"""A dataset as pyuff gives it: texts, numbers and arrays by name."""
 
 TIME_RESPONSE = (0, 1)
 """Types of functions that are samples in the order of time: general, and time response."""
@@ -54,19 +58,20 @@ def read_universal(reading: Reading, _stream: IO[bytes]) -> Table:
     return reading.table(columns, ignored, steps=steps)
 
 
-def _steps(each: Any, name: str) -> list[Step]:
-    step = float(each.get("abscissa_inc", 0.0) or 0.0)
+def _steps(each: Dataset, name: str) -> list[Step]:
+    step = float(np.ravel(each.get("abscissa_inc", 0.0))[0])
     if not each["abscissa_spacing"] or not 0.0 < step < float("inf"):
         return []
-    start = float(each.get("abscissa_min", 0.0) or 0.0)
+    start = float(np.ravel(each.get("abscissa_min", 0.0))[0])
     return [Step(step, f"abscissa increment {step:g} s ({name})", name, f"{start:g} s")]
 
 
-def _names(sets: list[Any]) -> list[str]:
+def _names(sets: list[Dataset]) -> list[str]:
     """The label of each channel if all labels differ; else its node and direction."""
     for key in ("ordinate_axis_lab", "rsp_ent_name", "id1", "id2"):
         labels = [" ".join(str(each.get(key, "")).split()) for each in sets]
         if all(label and label.upper() != "NONE" for label in labels) and len(set(labels)) == len(labels):
             return labels
-    places = [f"{each.get('rsp_node', '')}{DIRECTIONS.get(each.get('rsp_dir', 0), '')}" for each in sets]
+    directions = [DIRECTIONS.get(int(np.ravel(each.get("rsp_dir", 0))[0]), "") for each in sets]
+    places = [f"{each.get('rsp_node', '')}{direction}" for each, direction in zip(sets, directions, strict=True)]
     return places if len(set(places)) == len(places) else [f"{k}: {place}" for k, place in enumerate(places, 1)]
