@@ -440,6 +440,26 @@ def twincat(later: float = 0.0, mark: str = "\t", decimal: str = ".") -> Callabl
     return write
 
 
+def twincat_groups(full: bool) -> Callable[[Path], None]:
+    """Groups of channels with sample times of their own, which therefore end in different rows."""
+
+    def write(path: Path) -> None:
+        settings = [
+            ("Name", "fast", "Drive", "Position", "slow"), ("Data-Type", *["REAL64"] * 4),
+            ("SampleTime[ms]", "0,2", "2", "2", "5"), ("Unit", "(None)", "V (Voltage)", "(None)", "(None)"),
+        ]  # fmt: skip
+        lines = ["Name\tscope_1", "File\tC:\\scope_1.csv", "Starttime of export\t132959733843760000", ""]
+        lines += ["\t".join((key, a, key, b, c, key, d)) for key, a, b, c, d in settings] + [""]
+        for k in range(10 * N):
+            group = f"{2 * k}\t{V[k]}\t{Y[k]}" if k < N else "\t\t"
+            last = f"{5 * k}\t{k}" if k < N * 2 // 5 else "\t"
+            cells = f"{0.2 * k:.1f}\t{k}\t{group}\t{last}"
+            lines.append(cells if full else cells.rstrip("\t"))
+        path.write_text("\n".join(lines) + "\n")
+
+    return write
+
+
 def aixacct(tables: int) -> Callable[[Path], None]:
     """Loops of a piezoelectric sample, as public scripts for the TF Analyzer describe them."""
 

@@ -74,6 +74,8 @@ KINDS: dict[str, Kind] = {
     "gw instek, fast": Kind("a.csv", made.gw_instek("Fast"), "time from Sampling Period"),
     "twincat": Kind("a.csv", made.twincat(), "TwinCAT Scope"),
     "twincat, german": Kind("a.csv", made.twincat(mark=";", decimal=","), "TwinCAT Scope"),
+    "twincat, groups": Kind("a.csv", made.twincat_groups(True), "TwinCAT Scope"),
+    "twincat, groups of short rows": Kind("a.csv", made.twincat_groups(False), "TwinCAT Scope"),
     "aixacct": Kind("a.dat", made.aixacct(1), "aixACCT table"),
     "rows without cells": Kind("a.csv", made.empty_rows),
     "minus signs": Kind("a.csv", made.minus_signs),
@@ -188,6 +190,10 @@ def test_times_of_another_channel(tmp_path: Path) -> None:
     check(read_record(tmp_path / "a.csv"))
     made.twincat(0.6 * STEP)(tmp_path / "b.csv")
     assert ":7:1: error: Position has times of its own; export all channels with" in refused(tmp_path / "b.csv")
+    made.twincat_groups(True)(tmp_path / "b.csv")
+    said = refused(tmp_path / "b.csv", columns={"y": "slow"})
+    assert ":5:1: error: " in said
+    assert "has times of its own; export all channels with one sample time" in said
     made.mdf("4.10")(tmp_path / "c.mf4")
     said = refused(tmp_path / "c.mf4", columns={"y": "stage_temperature"})
     assert "the columns differ in length: 1/stage_temperature has 9, 0/Drive has 60 samples" in said

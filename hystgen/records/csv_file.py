@@ -161,6 +161,9 @@ def read_text(reading: Reading, blocks: Iterator[str], size: int) -> Table:
         Column(name, unit="s" if k in found.clocks else units[k], also=also[k]) for k, name in enumerate(names)
     ]
     chosen = reading.chosen(columns, line=found.header or 1, steps=found.steps)
+    own = {_time_of(found, columns.index(c)) for ours, c in chosen.items() if ours != "t"}
+    if found.times and len(own) == 1 and "t" in chosen:
+        chosen["t"] = columns[own.pop()]
     if "t" in chosen and columns.index(chosen["t"]) in found.clocks:
         reading.understood("times of day counted in seconds from the first")
     body = _Body(reading, found, {ours: columns.index(c) for ours, c in chosen.items()}, size)
@@ -168,6 +171,11 @@ def read_text(reading: Reading, blocks: Iterator[str], size: int) -> Table:
     for text in blocks:
         body.take(text)
     return body.table(columns, chosen)
+
+
+def _time_of(found: TableLayout, place: int) -> int:
+    """The column of time in front of a channel."""
+    return max((k for k in found.times if k <= place), default=0)
 
 
 def _layout(reading: Reading, sample: str) -> TableLayout:
@@ -249,12 +257,12 @@ class _Body:
         self.stored: dict[int, Array] = {
             k: np.empty(0)
             for k, name in enumerate(self.names)
-            if (name and alike[name] == 1) or k in self.wanted or k in layout.same_time
+            if (name and alike[name] == 1) or k in self.wanted or k in layout.times
         }
         self.text_columns: set[int] = set()
-        # Cells at the end of a line may be missing if their columns have no name and are not needed
+        # Cells at the end of a line may be missing if their columns have no name and are not needed, or end earlier
         named = [k + 1 for k, name in enumerate(self.names) if name or k in self.wanted]
-        self.fewest = max(named, default=len(self.names))
+        self.fewest = 1 if layout.times else max(named, default=len(self.names))
         # A row of separators alone has no cell: spreadsheets write such rows where something once was
         self.between = f" \t\f\v{layout.dialect.delimiter}"
         self.rows = 0
@@ -338,18 +346,16 @@ class _Body:
 
     def _check_times(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> None:
         """Raise RecordError if a column of time of another channel differs from that of the record."""
-        wanted = [columns.index(c) for c in chosen.values()]
-        for k in self.layout.same_time:
-            behind = [place for place in wanted if place > k]
-            later = [other for other in self.layout.same_time if other > k]
-            if self.time_column is None or not any(place < min(later, default=len(columns)) for place in behind):
+        for c in chosen.values():
+            k = _time_of(self.layout, columns.index(c))
+            if self.time_column is None or not self.layout.times or k == self.time_column:
                 continue
             t, other = self.stored[self.time_column], self.stored[k]
             step = float(np.nanmedian(np.diff(t))) if len(t) > 1 else 0.0
             apart = np.abs(other - t)
             if np.isnan(other).any() != np.isnan(t).any() or float(np.nanmax(apart, initial=0.0)) > SAME_TIME * step:
                 raise self.reading.refuse(
-                    f"{printable(columns[min(behind)].name)} has times of its own; export all channels with one sample "
+                    f"{printable(c.name)} has times of its own; export all channels with one sample "
                     "time",
                     self.layout.header,
                 )
@@ -466,7 +472,7 @@ class _Body:
                 continue
             lines.append(line)
             for k, numbers in values.items():
-                start, cell = cells[k]
+                start, cell = cells[k] if k < len(cells) else (len(row), "")
                 try:
                     number = self._number(k, cell)
                 except ValueError:

@@ -41,7 +41,7 @@ class TableLayout:
     rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
     `clocks`: columns with times of day; `rows`: number of rows stated in the file; `another`: text that would begin
     another table; `segments`: further headers among the rows, after which the table continues; `ends`: a line behind
-    the rows; `same_time`: further columns of time, which must agree with the first; `scale`: factors for columns of
+    the rows; `times`: the columns of time, if each is that of the channels behind it; `scale`: factors for columns of
     codes.
     """
 
@@ -58,7 +58,7 @@ class TableLayout:
     another: str = ""
     segments: Segments | None = None
     ends: str = ""
-    same_time: tuple[int, ...] = ()
+    times: tuple[int, ...] = ()
     scale: dict[int, float] = field(default_factory=dict)
 
 

@@ -6,7 +6,7 @@ import io
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from json import JSONDecodeError
@@ -417,6 +417,7 @@ NOTED_GAP = 3.0
 def repaired(reading: Reading, table: Table) -> Record:
     """The record made from a table, which is consumed. Raises RecordError with every problem."""
     columns = table.numbers
+    _cut(columns, {*reading.need, "t"} & columns.keys())
     length = len(next(iter(columns.values()), ()))
     keep = np.ones(length, dtype=bool)
     needed = [name for name in reading.need if name in columns]
@@ -460,6 +461,15 @@ def repaired(reading: Reading, table: Table) -> Record:
     y = columns.pop("y", None)
     read_as = "; ".join(reading.read_as)
     return Record(reading.name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
+
+
+def _cut(columns: dict[str, Array], needed: Set[str]) -> None:
+    """Cut the rows at the end without any needed number: those of other, longer columns."""
+    if not needed or any(not len(columns[name]) or math.isfinite(columns[name][-1]) for name in needed):
+        return
+    last = max(int(np.flatnonzero(np.isfinite(columns[name]))[-1:].sum()) for name in needed)
+    for name in columns:
+        columns[name] = columns[name][: last + 1]
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:

@@ -54,8 +54,9 @@ def gw_instek(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
             scale[value] = _setting(reading, of("Vertical Scale", k), "Vertical Scale") / PER_DIVISION
     found = TableLayout(Dialect(), names, header + 1, header, units, kind="GW Instek CSV", scale=scale)
     if detailed:
-        names[0], units[0] = "Time", "s"
-        found.same_time = tuple(range(2, 2 * channels, 2))
+        names[0] = "Time"
+        units[: 2 * channels : 2] = ["s"] * channels
+        found.times = tuple(range(0, 2 * channels, 2))
     else:
         step = _setting(reading, of("Sampling Period", 0), "Sampling Period")
         if step > 0.0:
@@ -99,8 +100,8 @@ def twincat(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     rows = [line for line in lines[first - 1 :] if line.strip()]
     decimal = "," if delimiter != "," and any("," in row for row in rows) else "."
     for k in times:
-        names[k], units[k] = "", ""
-    names[0], units[0] = "Time", "ms"
+        names[k], units[k] = "", "ms"
+    names[0] = "Time"
     found = TableLayout(Dialect(delimiter, decimal), names, first, header, units, kind="TwinCAT Scope", ends="EOF")
-    found.same_time = tuple(times[1:])
+    found.times = tuple(times)
     return found
