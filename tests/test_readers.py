@@ -120,6 +120,19 @@ def test_kinds(tmp_path: Path, name: str) -> None:
     assert record.name == path.name
 
 
+@pytest.mark.parametrize("name", KINDS)
+def test_kinds_packed(tmp_path: Path, name: str) -> None:
+    """Whatever is read is read from an archive too, though its suffix says nothing."""
+    kind = KINDS[name]
+    path = tmp_path / kind.file
+    kind.write(path)
+    (tmp_path / "packed").write_bytes(made.zipped({"data": path.read_bytes()}))
+    record = read_record(tmp_path / "packed", columns=parse_columns(kind.columns) if kind.columns else None)
+    check(record, kind.fewer, kind.steps)
+    assert kind.said in record.read_as
+    assert record.name == "packed"
+
+
 # What remains to be asked, and what a file cannot give ----------------------------------------------------------------
 
 
