@@ -230,7 +230,7 @@ def test_times_of_another_channel(tmp_path: Path) -> None:
         ("a.jsonl", b'{"t": 1, "v": 2}\n{"t": 2, "v"}\n', ":2:13: error: is not JSON"),
         ("a.json", b'{"a": ' + b"[" * 100000 + b"]" * 100000 + b"}", "is nested too deeply"),
         ("a.mf4", b"MDF     4.10    " + bytes(99), "is an MDF file that is damaged"),
-        ("a.ibw", b"\5\0" + bytes(382), "is not an Igor binary wave"),
+        ("a.ibw", b"\5\0" + bytes(382), "is an Igor binary wave that is damaged"),
         ("a.uff", b"    -1\n    58\nrun 3\n", "has no real function of time"),
         ("a.xlsx", made.zipped({"xl/workbook.xml": b"<"}), "is not an Excel workbook"),
         ("a.feather", b"ARROW1\0\0" + bytes(99), "is not an Arrow file"),

@@ -6,7 +6,6 @@ To add a format, add a module to this package and an entry to `BY_BYTES`, or to 
 from __future__ import annotations
 
 import re
-import struct
 from collections.abc import Callable, Mapping
 from typing import IO
 
@@ -15,7 +14,7 @@ from hystgen.records.array_files import read_mat, read_npy, read_npz
 from hystgen.records.arrow import read_arrow
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
-from hystgen.records.igor import read_igor
+from hystgen.records.igor import is_igor, read_igor
 from hystgen.records.json_file import read_json
 from hystgen.records.mdf import read_mdf
 from hystgen.records.netcdf import read_netcdf
@@ -130,21 +129,10 @@ def reader(reading: Reading, start: bytes, suffix: str) -> Reader:
         return found
     if start.startswith(b"\xff\xff\xff\xff") and len(start) > 8:
         return read_arrow
-    if _is_igor(start):
+    if is_igor(start):
         return read_igor
     if _UNIVERSAL.match(start):
         return read_universal
     if _JSON.match(start):
         return read_json
     return by_suffix or read_csv
-
-
-def _is_igor(start: bytes) -> bool:
-    """Whether a file begins with the header of an Igor binary wave, whose 16-bit words add up to zero."""
-    for order in "<>":
-        for version, size in ((2, 126), (3, 130), (5, 384)):
-            if start[:2] == struct.pack(f"{order}h", version) and len(start) >= size:
-                words = struct.unpack(f"{order}{size // 2}h", start[:size])
-                if sum(words) & 0xFFFF == 0:
-                    return True
-    return False

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.records.columns import Column
-from hystgen.records.reading import Reading, Table
+from hystgen.records.reading import Reading, Table, unlogged
 
 if TYPE_CHECKING:
     from asammdf import MDF
@@ -33,9 +33,11 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         from asammdf import MDF
     except ImportError:
         raise reading.uninstalled("MDF", "asammdf", "CSV", "instruments") from None
-    if (opened := _opened(MDF, reading.path)) is None:
+    with unlogged("asammdf"):
+        opened = _opened(MDF, reading.path)
+    if opened is None:
         raise reading.refuse("is an MDF file that is damaged or cut off; export it again")
-    with reading.parsing("an MDF file"), opened as file:
+    with reading.parsing("an MDF file"), unlogged("asammdf"), opened as file:
         columns: list[Column] = []
         ignored: list[str] = []
         groups = cast("list[_Group]", file.groups)  # of one of two classes, by the version

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
 import os
 from bisect import bisect_right
@@ -385,6 +386,18 @@ def one_dimension(shape: tuple[int, ...]) -> int:
     """Length of a vector, whether a row, a column or one-dimensional; 0 for anything else."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
+
+
+@contextmanager
+def unlogged(library: str) -> Iterator[None]:
+    """Keep a library from logging what is wrong with a file, which is reported once, as a problem."""
+    logger = logging.getLogger(library)
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 class CountingFile(io.FileIO):
