@@ -207,6 +207,9 @@ def test_times_of_another_channel(tmp_path: Path) -> None:
     said = refused(tmp_path / "b.csv", columns={"y": "slow"})
     assert ":5:1: error: " in said
     assert "has times of its own; export all channels with one sample time" in said
+    made.twincat()(tmp_path / "b.csv")
+    (tmp_path / "b.csv").write_text((tmp_path / "b.csv").read_text().replace("\t6.000\t", "\tsix\t"))
+    assert ':20:17: error: "six" in column "#3" is not a number' in refused(tmp_path / "b.csv")
     made.mdf("4.10")(tmp_path / "c.mf4")
     said = refused(tmp_path / "c.mf4", columns={"y": "stage_temperature"})
     assert "the columns differ in length: 1/stage_temperature has 9, 0/Drive has 60 samples" in said

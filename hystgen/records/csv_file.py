@@ -244,6 +244,8 @@ class _Body:
         self.names = layout.names
         self.dialect = layout.dialect
         self.wanted = frozenset(wanted.values())
+        if layout.times:
+            self.wanted |= {_time_of(layout, k) for k in self.wanted}
         self.size = size
         # Only the column t can hold times of day; in other columns they are text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
@@ -257,7 +259,7 @@ class _Body:
         self.stored: dict[int, Array] = {
             k: np.empty(0)
             for k, name in enumerate(self.names)
-            if (name and alike[name] == 1) or k in self.wanted or k in layout.times
+            if (name and alike[name] == 1) or k in self.wanted
         }
         self.text_columns: set[int] = set()
         # Cells at the end of a line may be missing if their columns have no name and are not needed, or end earlier
@@ -499,7 +501,7 @@ class _Body:
 
     def _bad_cell(self, column: int, cell: str, line: int, place: int) -> None:
         """Report a cell of a needed column that is not a number. The same fault in many cells counts as one problem."""
-        name = printable(self.names[column])
+        name = printable(self.names[column]) or f"#{column + 1}"
         if column == self.clock_column:
             kind, what, advice = "", "a time of day", "write every time like the first one"
         else:

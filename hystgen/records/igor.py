@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from hystgen.records.columns import Column, Step, is_time_unit
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, unlogged
 
-
 HEADERS = {2: 126, 3: 130, 5: 384}
 """[bytes] Size of the header by the version of a file."""
 

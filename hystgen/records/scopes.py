@@ -91,6 +91,8 @@ def twincat(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
         first += 1
     while first < len(lines) and not lines[first - 1].strip():
         first += 1
+    if "Name" not in settings:
+        return None
     names = list(settings["Name"])
     # Above a column of times, every line repeats the name of its setting
     times = [k for k in range(len(names)) if all(cells[k : k + 1] == [key] for key, cells in settings.items())]
