@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sys
 import tempfile
@@ -245,6 +246,19 @@ def test_what_cannot_be_read(tmp_path: Path, file: str, data: bytes, said: str) 
     path = tmp_path / file
     path.write_bytes(data)
     assert said in refused(path)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_kind_that_is_cut_or_damaged(tmp_path: Path, name: str) -> None:
+    """Whatever is wrong in a file, there is a record or a message."""
+    kind = KINDS[name]
+    path = tmp_path / kind.file
+    kind.write(path)
+    data = path.read_bytes()
+    for wrong in (data[: len(data) * 3 // 5], data[:40], data[:200] + b"\xff" * 9 + data[209:]):
+        path.write_bytes(wrong)
+        with contextlib.suppress(RecordError):
+            assert len(read_record(path, columns=parse_columns(kind.columns) if kind.columns else None)) <= N
 
 
 def test_a_file_with_a_password_and_one_larger_than_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

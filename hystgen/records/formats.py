@@ -129,7 +129,7 @@ def reader(reading: Reading, start: bytes, suffix: str) -> Reader:
         return found
     if start.startswith(b"\xff\xff\xff\xff") and len(start) > 8:
         return read_arrow
-    if is_igor(start):
+    if 0 in start[:2] and is_igor(start):
         return read_igor
     if _UNIVERSAL.match(start):
         return read_universal
