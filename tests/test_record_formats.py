@@ -341,7 +341,7 @@ def test_empty_and_scalar_datasets_are_no_columns(tmp_path: Path) -> None:
         file["one"] = 3.0
         file["zero"] = np.zeros(0)
         file["again"] = h5py.SoftLink("/gone")
-        file["table"] = np.zeros(N, dtype=[("a", "f8"), ("b", "f8")])
+        file["table"] = np.zeros(N, dtype=[("a", "S8"), ("b", "f8", 3)])
     record = read_record(tmp_path / "a.h5")
     check(record)
     assert record.notes == ("columns without numbers were left out: none, one, table, zero",)

@@ -368,7 +368,7 @@ def test_times_since_1970(tmp_path: Path) -> None:
 
     for factor in (10**3, 10**6, 10**9):
         for name in ("timestamp", "t"):
-            text = f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after'
+            text = f'the numbers of "{name}" are too large to be seconds, and it has no unit; give one, --columns '
             assert text in problems(stamps(name, factor))[0]
     assert read_record(stamps("timestamp [ms]", 10**3)).sample_time == pytest.approx(0.001, rel=1e-3)
 

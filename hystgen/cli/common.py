@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import functools
 import glob
 import itertools
 import math
@@ -166,7 +167,9 @@ def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
 
 def keep_inputs(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
     """Refuse to overwrite inputs."""
-    read = {os.path.realpath(path) for path in inputs}
+    from hystgen import records
+
+    read = {os.path.realpath(file) for path in inputs for file in records.files(path)}
     for path in outputs:
         if path and os.path.realpath(path) in read:
             raise Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
@@ -211,8 +214,24 @@ class Judging(click.Command):
 
 
 def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[..., object]]:
-    """The records given to a command."""
-    return click.argument("data", nargs=-1, required=required, type=click.Path(), callback=matched)
+    """The records given to a command, with those joined from two files each behind the others."""
+
+    def with_joined(command: Callable[..., object]) -> Callable[..., object]:
+        @functools.wraps(command)
+        def run(*, data: tuple[str, ...], join: tuple[tuple[str, str], ...], **others: object) -> object:
+            from hystgen import records
+
+            everything = (*data, *(records.MARK.join(pair) for pair in join))
+            for path in itertools.chain(*join):
+                if not os.path.exists(records.files(path)[0]):
+                    raise Failed(f"error: --join {path}: there is no such file; give the files of two channels", 2)
+            if required and not everything:
+                raise click.UsageError("Missing argument 'DATA...'.")
+            return command(data=everything, **others)
+
+        return click.argument("data", nargs=-1, type=click.Path(), callback=matched)(run)
+
+    return with_joined
 
 
 class ReadingArguments(TypedDict):
@@ -249,6 +268,10 @@ _RECORD_OPTIONS = [
     ),
     click.option("--sample-time", type=float, help="sample time in seconds, for files without time"),
     click.option("--delimiter", help="default: detected from the file"),
+    click.option(
+        "--join", nargs=2, multiple=True, type=click.Path(), metavar="DRIVE MEASURED",
+        help="two files with one channel each, as one record; with the same samples",
+    ),
     click.option("--history", metavar="V,V,..", help="drive values visited before each record, in the model's units"),
     click.option(
         "--rest", type=float, callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"

@@ -56,7 +56,8 @@ def simulate(
 
     if len(data) > 1 and output is None:
         raise common.Failed("error: several records need -o with a folder", 2)
-    if len({Path(path).stem for path in data}) < len(data):
+    names = [records.stem(path) for path in data]
+    if len(set(names)) < len(data):
         raise common.Failed("error: two records have the same name; their results would overwrite each other", 2)
     model = common.load_model(params, effects)
     if plot:
@@ -78,7 +79,7 @@ def simulate(
     if output and len(data) > 1 and Path(output).is_file():
         raise common.Failed(f"error: {output} is a file, and several records need -o with a folder", 2)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
-        targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
+        targets = [Path(output) / f"{name}.csv" for name in names]
     common.keep_inputs([*targets, plot], [params, *data])
     simulated = common.guarded(
         params,

@@ -34,10 +34,7 @@ from hystgen.fleet import outliers, workers
 from hystgen.fleet.workers import Task, UnitResult
 from hystgen.identification import settings
 from hystgen.identification.settings import Settings
-from hystgen.records import FORMATS, Record, several, write_atomically
-
-SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
-"""Suffixes of the files that are read from a folder."""
+from hystgen.records import Record, several, suffixes, write_atomically
 
 KEPT_IN = ".hystgen"
 """Folder, inside the output folder, with the results of finished units."""
@@ -248,7 +245,7 @@ def _expanded(source: str) -> list[Path]:
     """The files to which a path, a folder or a pattern refers, sorted."""
     path = Path(source)
     if path.is_dir():
-        found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]
+        found = [file for file in path.iterdir() if file.suffix.lower() in suffixes() and not file.name.startswith(".")]
     else:
         found = [path] if path.is_file() else [Path(name) for name in glob.glob(source, recursive=True)]
     found = sorted(file for file in found if file.is_file())

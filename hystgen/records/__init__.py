@@ -1,38 +1,31 @@
 """Measured data in, computed columns out: one file is one experiment.
 
-Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems in a file are reported at once, each with its
-position; small faults in a recording are repaired and counted in `Record.notes`.
+Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and the
+files of NumPy, MATLAB, Excel and others that `formats` lists, packed or not. All problems in a file are reported at
+once, each with its position; small faults in a recording are repaired and counted in `Record.notes`.
 
-For a text file, `layout` determines how the table is written, `csv_file` splits it into lines and reads the rows, and
-`cells` reads single cells. For every format, `columns` finds the requested columns and the sample rate, and `reading`
-turns them into the record.
-
-To add a format, add a module to this package and an entry to `FORMATS`.
+`formats` chooses the reader of a file by its first bytes. For a text file, `layout` determines how the table is
+written, `csv_file` splits it into lines and reads the rows, and `cells` reads single cells. For every format, `columns`
+finds the requested columns and the sample rate, and `reading` turns them into the record.
 """
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, cast
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, cast
 
 from hystgen.basics import arguments, console
 from hystgen.basics.problems import RecordError, printable
 from hystgen.basics.progress import Progress
 from hystgen.basics.writing import write_atomically
-from hystgen.records.array_files import read_mat, read_npz
+from hystgen.records import formats, joined, packed
 from hystgen.records.columns import LISTED, agreed_units, headers, parse_columns
-from hystgen.records.csv_file import read_csv
-from hystgen.records.hdf5 import read_hdf5, read_mat_73
 from hystgen.records.memory import Columns, in_memory
 from hystgen.records.memory import read as read_memory
-from hystgen.records.parquet import read_parquet
-from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
+from hystgen.records.reading import LARGEST, SHORTEST, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
-from hystgen.records.tdms import read_tdms
 from hystgen.records.units import converted, wanted
 from hystgen.records.writing import columns_text, write_columns
 
@@ -41,30 +34,6 @@ if TYPE_CHECKING:
 
 Source = Record | str | os.PathLike[str] | Columns
 """A record, the path of a data file, or its samples in memory."""
-
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-
-
-def _any_mat(reading: Reading, stream: IO[bytes]) -> Table:
-    """A MATLAB file of either kind: v7.3 is HDF5 after a 512-byte header of MATLAB's own."""
-    start = stream.read(520)
-    stream.seek(0)
-    if start[:10] == b"MATLAB 7.3" or _HDF5 in (start[:8], start[512:]):
-        return read_mat_73(reading, stream)
-    return read_mat(reading, stream)
-
-
-FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
-    ".npz": read_npz,
-    ".mat": _any_mat,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
-    ".tdms": read_tdms,
-    ".parquet": read_parquet,
-    ".pq": read_parquet,
-}
-"""Readers by suffix in lower case; any other file is text."""
-
 
 def read_records(
     sources: Source | Iterable[Source], columns: Mapping[str, str] | None = None, sample_time: float | None = None,
@@ -193,6 +162,24 @@ def _check_arrays(record: Record) -> None:
         raise ValueError(f"{record.name} has {len(record.t)} samples of t and {len(record.v)} of v")
 
 
+def files(source: object) -> list[str]:
+    """The paths of the files that a record is read from; none for samples in memory."""
+    if not isinstance(source, str | os.PathLike):
+        return []
+    path = os.fspath(source)
+    return [packed.location(each)[0] for each in (joined.files(path) if joined.MARK in path else [path])]
+
+
+def stem(source: str) -> str:
+    """The name of a record for files made from it: that of its file without suffixes, of several files all of them."""
+    return joined.MARK.join(packed.stem(each) for each in joined.files(source))
+
+
+def suffixes() -> tuple[str, ...]:
+    """Suffixes of the files that are records, in lower case."""
+    return (".csv", ".tsv", ".lvm", *packed.PACKED, *formats.BY_SUFFIX)
+
+
 def _read(
     file: str, columns: Mapping[str, str] | None, sample_time: float | None, delimiter: str | None, need: Sequence[str],
     tick: Callable[[float], None], points: bool,
@@ -204,36 +191,55 @@ def _read(
     if sample_time is not None and not (0.0 < sample_time < float("inf")):
         reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
     reading.refuse_if_any()
-    try:
-        stream = io.BufferedReader(CountingFile(file, tick))
-    except OSError as failure:
-        raise reading.refuse(
-            f"cannot be read ({failure.strerror or failure}); give the path of a data file"
-        ) from None
-    with stream:
-        if not stream.peek(1):
+    channels = joined.files(file) if joined.MARK in file else [file]
+    if len(channels) == 1:
+        return repaired(reading, _table(reading))
+    reading.name = " + ".join(os.path.basename(each) for each in channels)
+    times = {"t": reading.columns["t"]} if "t" in reading.columns else {}
+    parts = [Reading(each, times, sample_time, delimiter, (), tick, channel=True) for each in channels]
+    tables, refused = [], []
+    for part in parts:
+        try:
+            tables.append(_table(part))
+        except RecordError as error:
+            refused.extend(error.problems)
+    if refused:
+        raise RecordError(refused)
+    return repaired(reading, joined.joined(reading, parts, tables))
+
+
+def _table(reading: Reading) -> Table:
+    """The content of one file."""
+    reading.path, reading.part = packed.location(reading.file)
+    with ExitStack() as stack:
+        stream, start, suffix = packed.opened(reading, stack)
+        if not start:
             raise reading.refuse("is empty; record again, or give another file")
-        table = FORMATS.get(Path(file).suffix.lower(), read_csv)(reading, stream)
-    return repaired(reading, table)
+        read = formats.reader(reading, start, suffix)
+        if reading.part and read not in formats.WITH_PARTS:
+            raise reading.refuse(f"has no parts, of which {printable(reading.part)} could be one; give the file alone")
+        return read(reading, stream)
 
 
 def _size(source: Source) -> int:
     """Bytes to read; 0 for a missing file, which is reported when it is opened."""
-    try:
-        return os.stat(source).st_size if isinstance(source, str | os.PathLike) else 0
-    except OSError:
+    if not isinstance(source, str | os.PathLike):
         return 0
+    return sum(os.stat(path).st_size for path in files(source) if os.path.exists(path))
 
+
+MARK = joined.MARK
 
 __all__ = [
-    "FORMATS",
     "LARGEST",
+    "MARK",
     "SHORTEST",
     "Record",
     "RecordError",
     "Source",
     "agreed_units",
     "columns_text",
+    "files",
     "headers",
     "in_units",
     "no_value",
@@ -241,6 +247,8 @@ __all__ = [
     "read_record",
     "read_records",
     "several",
+    "stem",
+    "suffixes",
     "write_atomically",
     "write_columns",
 ]

@@ -1,7 +1,8 @@
-"""NumPy `.npz` archives and MATLAB `.mat` files up to v7: named arrays, structs with fields."""
+"""NumPy `.npy` and `.npz` files and MATLAB `.mat` files up to v7: named arrays, structs with fields."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import IO, TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from hystgen.records import mat_nesting
+from hystgen.records import mat_nesting, mat_objects
 from hystgen.records.columns import Column, Step, from_number, is_named
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
 
@@ -27,6 +28,33 @@ TOGETHER = 1 << 20
 
 MOST_TOGETHER = 1000
 """Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested name."""
+
+
+def read_npy(reading: Reading, stream: IO[bytes]) -> Table:
+    """Read a NumPy array: a matrix, one channel, or a structured array, whose fields are columns."""
+    with reading.parsing("a NumPy .npy file"):
+        try:
+            array = np.load(stream, allow_pickle=False)
+        except ValueError as failure:
+            if "allow_pickle" not in str(failure):
+                raise
+            raise reading.refuse("holds Python objects; save arrays of numbers, with numpy.savez") from None
+        if array.dtype.names:
+            fields = {name: array[name] for name in array.dtype.names}
+            columns = [
+                Column(name, length=x.size, read=partial(np.array, x.ravel()))
+                for name, x in fields.items()
+                if x.dtype.kind in "fiub" and one_dimension(x.shape)
+            ]
+            kept = {c.name for c in columns}
+            return reading.table(columns, [name for name in fields if name not in kept])
+        if array.dtype.kind not in "fiub":
+            raise reading.refuse("holds no real numbers; save an array of real numbers")
+        name = "array"
+        if length := one_dimension(array.shape):
+            return reading.table([Column(name, length=length, read=partial(np.array, array.ravel()))], [])
+        matrices: dict[str, Matrix] = {name: (array.shape, lambda: array)} if in_matrix(array.shape) else {}
+        return reading.table([], [name], matrices=matrices)
 
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
@@ -97,7 +125,9 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
         steps: list[Step] = []
         matrices: dict[str, Matrix] = {}
         vectors = _MatVectors(stream)
-        for name, shape, kind in whosmat(stream):
+        objects = mat_nesting.objects(stream)
+        stream.seek(0)
+        for name, shape, kind in _listed(stream) if objects else whosmat(stream):
             if kind == "struct":
                 _fields(_mat_variables(stream, [name])[name], f"{name}.", columns, ignored, steps)
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
@@ -107,7 +137,25 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
                 ignored.append(name)
                 if kind in MATLAB_NUMBERS and in_matrix(shape):
                     matrices[name] = shape, partial(_mat_matrix, stream, name)
+        if objects and len(columns) < len(reading.need) and not matrices:
+            raise reading.refuse(mat_objects.advice(reading, objects))
+        ignored += objects
         return reading.table(columns, ignored, steps=steps, matrices=matrices)
+
+
+def _listed(stream: IO[bytes]) -> list[tuple[str, tuple[int, ...], str]]:
+    """Variables with their shapes and classes, of a file with objects, which scipy cannot list."""
+    from scipy.io import loadmat
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # all objects have the same name
+        everything = loadmat(stream)
+    found = {name: x for name, x in everything.items() if isinstance(x, np.ndarray) and not name.startswith("__")}
+    kinds = {
+        name: "double" if x.dtype.kind in "fiub" else "struct" if x.dtype.names else "" for name, x in found.items()
+    }
+    opaque = {name for name, x in found.items() if type(x).__name__ == "MatlabOpaque"}
+    return [(name, x.shape, kinds[name]) for name, x in found.items() if name not in opaque and name != "None"]
 
 
 def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, NDArray[np.generic]]:

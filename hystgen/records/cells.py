@@ -10,17 +10,34 @@ from datetime import date
 # Times of day: ISO 8601, `5.3.2024 14:21:05.5`, `14:21:05`, `2:21:05 PM` -------------------------------------
 
 
+MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+
+ZONES = {
+    "UTC": 0, "GMT": 0, "BST": 1, "WEST": 1, "WET": 0, "CEST": 2, "CET": 1, "EEST": 3, "EET": 2, "MSK": 3, "JST": 9,
+    "EST": -5, "EDT": -4, "CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7,
+}
+"""[h] Names of time zones, and by how much each is ahead of UTC; only the change within a record matters."""
+
 _TIME = re.compile(
-    r"""(?:(?P<date>\d{4}([-/.])\d{1,2}\2\d{1,2}|\d{1,2}([-/.])\d{1,2}\3\d{4})(?:\s*,?\s+|[Tt]))?
-    (?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[.,:](?P<fraction>\d+))?
+    rf"""(?:(?P<date>\d{{4}}([-/.])\d{{1,2}}\2\d{{1,2}}|\d{{1,2}}([-/.])\d{{1,2}}\3\d{{4}}
+        |\d{{1,2}}[-\ ](?P<month>{"|".join(MONTHS)})[a-z]*[-\ ]\d{{4}})(?:\s*,?\s+|[Tt]))?
+    (?P<hour>\d{{1,2}}):(?P<minute>\d{{2}}):(?P<second>\d{{2}})(?:[.,:](?P<fraction>\d+))?
     \s*(?P<half>[AaPp]\.?[Mm]\.?)?
-    \s*(?P<zone>[Zz]|UTC|GMT|[+-]\d{2}(?::?\d{2})?)?""",
+    \s*(?P<zone>[Zz]|{"|".join(ZONES)}|(?:UTC|GMT)?[+-]\d{{1,2}}(?::?\d{{2}})?)?(?:\s*\[[\w/+-]+\])?""",
     re.VERBOSE,
 )
 
 DAY = 86400
 
 NANO = 10**9
+
+HOUR = 3600 * NANO
+
+SLOWEST = 600 * NANO
+"""[ns] Clocks are watched for a change of summer time only at steps below this, where an hour cannot be a pause."""
+
+CHANGED_WITHIN = 3
+"""[steps] How long after the full hour the first time behind a change of summer time may be."""
 
 PAST_MIDNIGHT = 0.5
 """[days] A clock without a date that jumps back by at least this much has passed midnight."""
@@ -34,12 +51,17 @@ def is_time(cell: str) -> bool:
 class Clock:
     """Reads the times of one column, in file order, as seconds from the first time.
 
-    `problem`: why the times cannot be trusted; empty if they can be.
+    `problem`: why the times cannot be trusted; empty if they can be; `notes`: what was corrected; `first`: nanoseconds
+    from year 1 to the first time, None if the times have no date.
     """
 
     def __init__(self) -> None:
         self._first: int | None = None
         self._latest = 0
+        self._step = 0
+        self._shift = 0
+        self.notes: tuple[str, ...] = ()
+        self.first: int | None = None
         self._midnights = 0
         self._dates: frozenset[str] = frozenset()
         self.problem = ""
@@ -60,19 +82,40 @@ class Clock:
         time = ((hour * 60 + minute) * 60 + second - _offset(match["zone"])) * NANO + fraction
         if match["date"]:
             time += self._day(match["date"]) * DAY * NANO
+            if not match["zone"]:
+                time = self._summer_time(time)
         else:
             time += self._midnights * DAY * NANO
             if self._first is not None and time < self._latest - PAST_MIDNIGHT * DAY * NANO:
                 self._midnights += 1
                 time += DAY * NANO
-        self._latest = time
         if self._first is None:
             self._first = time
+            self.first = time if match["date"] else None
+        elif time > self._latest:
+            self._step = time - self._latest
+        self._latest = time
         # The difference is an integer, so only the division rounds
         return (time - self._first) / NANO
 
+    def _summer_time(self, time: int) -> int:
+        """A local time of a date as the time that would have passed without changes between summer and winter time."""
+        told, time = time, time + self._shift
+        after = time - self._latest
+        for change, said in ((HOUR, "back"), (-HOUR, "forward")):
+            step = after + change
+            near = 0 < step <= CHANGED_WITHIN * self._step and told % HOUR < step
+            if self._first is not None and near and self._step < SLOWEST:
+                self._shift += change
+                self.notes += (f"the clock was put {said} by an hour; it was taken as running on",)
+                return time + change
+        return time
+
     def _day(self, text: str) -> int:
         """Day number of a date. Which of its numbers is the month matters only if the date changes."""
+        if month := next((k for k, name in enumerate(MONTHS, 1) if name in text), 0):
+            day, *_, year = re.split("[- ]", text)
+            return date(int(year), month, int(day)).toordinal()
         one, two, three = (int(part) for part in re.split("[-/.]", text))
         if one > 31:
             return date(one, two, three).toordinal()
@@ -90,10 +133,13 @@ class Clock:
 
 def _offset(zone: str | None) -> int:
     """Seconds by which a clock is ahead of UTC."""
-    if not zone or zone[0] not in "+-":
+    if not zone or zone in "Zz":
         return 0
-    digits = zone[1:].replace(":", "").ljust(4, "0")
-    return (-60 if zone[0] == "-" else 60) * (60 * int(digits[:2]) + int(digits[2:]))
+    if zone in ZONES:
+        return 3600 * ZONES[zone]
+    sign, digits = zone.removeprefix("UTC").removeprefix("GMT")[0], re.sub(r"\D", "", zone)
+    hours, minutes = (digits, "0") if len(digits) <= 2 else (digits[:-2], digits[-2:])
+    return (-60 if sign == "-" else 60) * (60 * int(hours) + int(minutes))
 
 
 # Numbers and cell separators ---------------------------------------------------------------------------------

@@ -5,8 +5,9 @@ from __future__ import annotations
 import difflib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from datetime import date, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from hystgen.records.record import Array, Record
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
 
+DAYS = ("d", "day", "days")
+
 TIMES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(SECONDS, (1.0, 1.0)),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), (1.0, 1e3)),
@@ -27,8 +30,12 @@ TIMES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), (1.0, 1e9)),
     **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
     **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
+    **dict.fromkeys(DAYS, (86400.0, 1.0)),
 }
 """Factor and divisor to get seconds: x/1000 is the double nearest to the intended time; 0.001*x may not be."""
+
+NEVER_THE_START = 1e4
+"""[days] Counts of days as large as this are dates: 27 years after a start there is no record of one."""
 
 _ONE = (
     r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
@@ -71,8 +78,12 @@ def unit_alone(text: str) -> str | None:
 
 
 def is_time_unit(unit: str) -> bool:
-    """Whether a unit is a unit of time."""
-    return plain(unit).casefold() in TIMES
+    """Whether a unit is a unit of time, which may count from a date: `seconds since 2024-03-05`."""
+    return _of_time(unit) in TIMES
+
+
+def _of_time(unit: str) -> str:
+    return plain(unit).partition(" since ")[0].casefold()
 
 
 def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
@@ -87,15 +98,18 @@ def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
 
 def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and a note for the user, empty if they were in seconds already."""
-    scale = TIMES.get(plain(unit).partition(" since ")[0].casefold())
+    scale = TIMES.get(_of_time(unit))
     if scale is None:
         return t, f'the unit "{printable(unit)}" of t is not a known unit of time; t was read as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
-    seconds = t / divisor
+    dated = _of_time(unit) in DAYS and len(t) > 0 and np.nanmin(t) > NEVER_THE_START
+    # From the first day on, since the seconds of all days before it would round the fraction of a day away
+    seconds = (t - np.nanmin(t) if dated else t) / divisor
     seconds *= factor
-    return seconds, f"t is in {printable(unit)}; it was converted to seconds"
+    more = " from the first" if dated else ""
+    return seconds, f"t is in {printable(unit)}; it was converted to seconds{more}"
 
 
 def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
@@ -227,6 +241,53 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
     return Step(seconds, f"{said} ({printable(where)}{'' if text else ', without a unit'})")
 
 
+# Times without a unit that count days: serial days of spreadsheets, and MATLAB's datenums --------------------
+
+
+DAYS_OF_1970 = 25569.0
+"""[days] Excel's number of the first day of 1970."""
+
+COUNTS = {"Excel's days": (date(1899, 12, 30), (DAYS_OF_1970, 73050.0)), "MATLAB's days": (None, (719529.0, 767010.0))}
+"""Day 0 of each count (None: of year 0), and its numbers [days] of the first day of 1970 and of the last of 2099."""
+
+QUICKEST = 1e-6
+"""[s] In seconds, a record with steps this small would be sampled at 1 MHz and begin 7 hours after zero: they are days.
+Set by: tests/test_readers.py TestDays."""
+
+SLOWEST = 10.0 / 86400.0
+"""[days] In days, a record with steps this large would be sampled every 10 s: it counts seconds. In between, only the
+user knows. Set by: tests/test_readers.py TestDays."""
+
+DOUBTFUL = "?"
+"""The answer if the numbers may be seconds as well as days."""
+
+_DATED = re.compile(r"(?i)date|datum|fecha|serial|excel|(?:^|[^a-z])days?(?:[^a-z]|$)")
+
+
+def counted_days(t: Array, name: str) -> str:
+    """What is counted if a time (N,) without a unit counts days, in words; empty if it does not; `DOUBTFUL`.
+
+    `name`: the column's, which may say that it is a date.
+    """
+    if not len(t) or not t[int(np.argmax(np.isfinite(t)))] >= DAYS_OF_1970:
+        return ""
+    known = t[np.isfinite(t)]
+    steps = np.diff(known)
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        return ""
+    for what, (zero, (first, last)) in COUNTS.items():
+        if not first <= known.min() <= known.max() <= last:
+            continue
+        step = float(np.median(steps))
+        if step > QUICKEST and not _DATED.search(name):
+            return "" if step >= SLOWEST else DOUBTFUL
+        number = int(known[0])
+        day = zero + timedelta(number) if zero else date.fromordinal(number - 366)
+        return f"{what}, of which {number} is {day.isoformat()}"
+    return ""
+
+
 # Assignment of a file's columns to ours: t, v, y, u ----------------------------------------------------------
 
 
@@ -347,8 +408,8 @@ def parse_columns(text: str) -> dict[str, str]:
 class Finder:
     """Finds the requested columns; `problems` lists the reasons why the others were not found.
 
-    `understood`: columns found by the meaning of their names, keyed by our names; `steps`: the file's sample rate for
-    the columns found, if it has no time.
+    `understood`: columns found by the meaning of their names, keyed by our names; `stated`: the file's sample rates
+    for the columns found, if it has no time; `steps`: those of them that are needed, since the user gives none.
     """
 
     columns: Sequence[Column]
@@ -358,44 +419,60 @@ class Finder:
     problems: list[str] = field(default_factory=list)
     understood: dict[str, Column] = field(default_factory=dict)
     steps: list[Step] = field(default_factory=list)
+    stated: list[Step] = field(default_factory=list)
     _unnamed: list[str] = field(default_factory=list)
     _several: dict[str, list[Column]] = field(default_factory=dict)
     _asked: set[str] = field(default_factory=set)
+    _signals: int = 0
 
     def find(
-        self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False
+        self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False, channel: bool = False
     ) -> dict[str, Column]:
         """The columns found, keyed by our names.
 
         `need`: names that must be present; `timed`: the user gives the sample time, so the file need not have a time;
         `steps`: sample rates in the file, used only if it has no time; `points`: the file need not have a time either
-        if every column is already taken.
+        if every column is already taken; `channel`: it need not have one at all.
         """
         found: dict[str, Column] = {}
+        self._signals = len(need)
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
-        missing = []
-        for ours in wanted:
-            required = ours in self.mapping or (not timed if ours == "t" else ours in need)
-            chosen = self._one(ours, required)
-            if chosen is not None:
-                found[ours] = chosen
-            elif required and ours not in self._asked:
-                missing.append(ours)
-        # Names come first; meaning only decides among the remaining columns
-        for ours in missing:
-            chosen = None if ours in self.mapping else self._meant(ours, found)
-            if chosen is not None:
-                found[ours] = self.understood[ours] = chosen
-                continue
-            if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
-                self.steps = [step for step in steps if step.belongs(c.name for c in found.values())]
-                if points and len(found) == len(self.columns):
+        # The time comes last, since there may be one beside each group of columns
+        late = [ours for ours in wanted if ours == "t" and "t" not in self.mapping]
+        for group in ([ours for ours in wanted if ours not in late], late):
+            missing = []
+            for ours in group:
+                required = ours in self.mapping or (not timed if ours == "t" else ours in need)
+                chosen = self._one(ours, required, self._folders(found, need))
+                if chosen is not None:
+                    found[ours] = chosen
+                elif required and ours not in self._asked:
+                    missing.append(ours)
+            # Names come first; meaning only decides among the remaining columns
+            for ours in missing:
+                chosen = None if ours in self.mapping else self._meant(ours, found, self._folders(found, need))
+                if chosen is not None:
+                    found[ours] = self.understood[ours] = chosen
                     continue
-            if ours not in self._asked and ours not in self._several and not (ours == "t" and self.steps):
-                self._missing(ours, self.mapping.get(ours, ours))
+                if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
+                    self.steps = self._stated(steps, found)
+                    if channel or (points and len(found) == len(self.columns)):
+                        continue
+                if ours not in self._asked and ours not in self._several and not (ours == "t" and self.steps):
+                    self._missing(ours, self.mapping.get(ours, ours))
+        if "t" not in found:
+            self.stated = self._stated(steps, found)
         self._name_together(found)
         self._apart({ours: c for ours, c in found.items() if ours in self.mapping}, found, need)
         return found
+
+    def _folders(self, found: Mapping[str, Column], need: Sequence[str]) -> set[str]:
+        """The groups of the needed columns."""
+        return {c.folder for ours, c in found.items() if ours in need}
+
+    def _stated(self, steps: Sequence[Step], found: Mapping[str, Column]) -> list[Step]:
+        names = [c.name for c in found.values() or self.columns]
+        return [step for step in steps if step.belongs(names)]
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
         """Report columns in the file that serve as two needed columns."""
@@ -411,8 +488,8 @@ class Finder:
         for twice in dict.fromkeys(c.name for c in columns if columns.count(c) > 1):
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
-    def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
-        """The only column whose name means `ours`; else, for a time, the first column if its unit is one of time, and
+    def _meant(self, ours: str, found: Mapping[str, Column], folders: Set[str] = frozenset()) -> Column | None:
+        """The only column whose name means `ours`; else, for a time, the first or only column with a unit of time, and
         for a reference a position with nothing beside it but time, since a file with a drive is a recording."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
@@ -421,7 +498,10 @@ class Finder:
             alone = [c for c in self.columns if not (is_time_unit(c.unit) or meaning(c) == "t" or _words(c) & COUNTING)]
             meant = [c for c in alone if len(alone) == 1 and c in free and meaning(c) == "y"]
         if not meant and ours == "t":
-            meant = [c for c in self.columns[:1] if c in free and is_time_unit(c.unit)]
+            meant = [c for c in free if is_time_unit(c.unit)]
+            meant = [c for c in self.columns[:1] if c in meant] or meant
+        if len(meant) > 1 and ours == "t" and len(folders) == 1:
+            meant = [c for c in meant if c.folder in folders] or meant
         if len(meant) > 1:
             self._several[ours] = meant
         return meant[0] if len(meant) == 1 else None
@@ -435,6 +515,13 @@ class Finder:
         unnamed = [ours for ours in (*STANDARD, *self._unnamed) if ours in (*self._unnamed, *self._several)]
         unnamed = list(dict.fromkeys(unnamed))
         wanted = ",".join(f"{ours}=COLUMN" for ours in unnamed)
+        channels = [c for c in self.columns if not is_time_unit(c.unit) and meaning(c) != "t"]
+        if len(channels) == 1 < self._signals and not self.outside:
+            self.problems.append(
+                f"has one channel, {_listed(channels)}; name the files of the drive and the measured signal with "
+                "--join DRIVE MEASURED"
+            )
+            return
         *others, last = (f'"{ours}"' for ours in unnamed)
         there = f"are no columns {', '.join(others)} and {last}" if others else f"is no column {last}"
         self.problems.append(
@@ -462,9 +549,10 @@ class Finder:
         """How to refer to a column in `--columns`: its name, or its number if it has none, or one that is ambiguous or
         has a comma."""
         alone = c.name and sum(each.name == c.name for each in self.columns) == 1
-        return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
+        typed = alone and not set(",=\"'`$\\") & set(c.name) and c.name == printable(c.name) == c.name.strip()
+        return c.name if typed else f"#{self.columns.index(c) + 1}"
 
-    def _one(self, ours: str, required: bool) -> Column | None:
+    def _one(self, ours: str, required: bool, folders: Set[str] = frozenset()) -> Column | None:
         theirs = self.mapping.get(ours, ours)
         # A path in an HDF5 file may start at the root, as other tools print it
         exact = [c for c in self.columns if c.name in (theirs, theirs.removeprefix("/"))]
@@ -481,12 +569,25 @@ class Finder:
             [c for c in self.columns if c.label == theirs],
             [c for c in self.columns if c.also == theirs],
         ):
+            if len(matches) > 1 and ours == "t" and len(folders) == 1:  # the time beside the other columns
+                matches = [c for c in matches if c.folder in folders] or matches
             if len(matches) == 1:
                 return matches[0]
             if matches:
                 if required:
                     self._ask(ours, theirs, matches)
                 return None
+        return self._with_unit(theirs) if ours in self.mapping else None
+
+    def _with_unit(self, theirs: str) -> Column | None:
+        """The only column of this name without a unit, if the user gives its unit: `t=Time [d]`."""
+        name, unit = split_unit(theirs)
+        bare = [c for c in self.columns if unit and not c.unit and name in (c.name, c.own, c.label)]
+        if not bare and unit and name[:1] == "#" and name[1:].isdecimal():
+            bare = [c for c in self.columns[: int(name[1:])][-1:] if not c.unit]
+        if len(bare) == 1:
+            bare[0].unit = unit
+            return bare[0]
         return None
 
     def _ask(self, ours: str, theirs: str, matches: Sequence[Column]) -> None:
@@ -525,12 +626,12 @@ class Finder:
         known = MEANINGS.get(ours, frozenset()) | DECIDE.get(ours, frozenset()) | {ours}
         for c in self.columns:
             if _words(c) & known and self.mapping.get(ours) != c.name:
-                return f'did you mean --columns "{ours}={printable(c.name)}"?'
+                return f'did you mean --columns "{ours}={self._address(c)}"?'
         wanted = self.mapping.get(ours, ours).casefold()
         close = difflib.get_close_matches(wanted, [c.name.casefold() for c in self.columns], 1)
         for c in self.columns:
             if close and c.name.casefold() == close[0]:
-                return f'did you mean --columns "{ours}={printable(c.name)}"?'
+                return f'did you mean --columns "{ours}={self._address(c)}"?'
         return f'name it with --columns "{ours}=COLUMN"'
 
 
@@ -546,7 +647,12 @@ def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, C
     return names
 
 
+def _shown(c: Column, number: int) -> str:
+    """A name as messages list it, with the number that selects a column whose name cannot be typed."""
+    return (printable(c.name) + (f" (#{number})" if not c.name.isprintable() else "")) or '""'
+
+
 def _listed(columns: Sequence[Column]) -> str:
-    names = [printable(c.name) or '""' for c in columns[:LISTED]]
+    names = [_shown(c, k) for k, c in enumerate(columns[:LISTED], 1)]
     more = len(columns) - LISTED
     return (", ".join(names) + (f" and {more} more" if more > 0 else "")) or "none"

@@ -6,6 +6,7 @@ A file of any size thus needs little more memory than its columns, and every fau
 from __future__ import annotations
 
 import codecs
+import contextlib
 import io
 import os
 import re
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted, printable
-from hystgen.records import layout
+from hystgen.records import layout, scopes
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Clock, Dialect, is_comment, shape
 from hystgen.records.columns import LISTED, Column
 from hystgen.records.layout import TableLayout
@@ -40,6 +41,10 @@ LOOKED_AT = 1 << 10
 """[bytes] How much of a file, from its start, is searched for signs of UTF-16 without a byte order mark."""
 
 
+_MINUS = re.compile("(?<![^\\s,;|\"eE])\N{MINUS SIGN}(?=[.,\\d])")
+"""A typographic minus sign in front of a number."""
+
+
 def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
     """The file's text in blocks of whole lines; every line ends in a line feed, except perhaps the last."""
     latin = False
@@ -55,6 +60,8 @@ def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
             latin = True
         if "\r" in text:
             text = text.replace("\r\n", "\n").replace("\r", "\n")
+        if "\N{MINUS SIGN}" in text:
+            text = _MINUS.sub("-", text)
         yield text
 
 
@@ -122,13 +129,23 @@ SAMPLE_LINES = 8
 PARAMETERS = re.compile(r"^hystgen\s*:", re.MULTILINE)
 """How a line of a parameter file begins; no line of a table begins like this."""
 
+SAME_TIME = 0.5
+"""[steps] Times of two channels that are further apart belong to different samples."""
+
 SPARE = 1.05
 """Ratio of the number of rows allocated to the number estimated from the first block."""
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a text file with one row per line."""
-    blocks = texts(reading, stream)
+    size = 0
+    with contextlib.suppress(OSError, io.UnsupportedOperation):
+        size = os.fstat(stream.fileno()).st_size  # 0 for a pipe
+    return read_text(reading, texts(reading, stream), size)
+
+
+def read_text(reading: Reading, blocks: Iterator[str], size: int) -> Table:
+    """Read a table from blocks of whole lines, with about `size` characters in all; 0 if that is not known."""
     sample = ""
     while (len(sample) < SAMPLE or sample.count("\n") < SAMPLE_LINES) and (text := next(blocks, "")):
         sample += text
@@ -144,9 +161,11 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
         Column(name, unit="s" if k in found.clocks else units[k], also=also[k]) for k, name in enumerate(names)
     ]
     chosen = reading.chosen(columns, line=found.header or 1, steps=found.steps)
+    own = {_time_of(found, columns.index(c)) for ours, c in chosen.items() if ours != "t"}
+    if found.times and len(own) == 1 and "t" in chosen:
+        chosen["t"] = columns[own.pop()]
     if "t" in chosen and columns.index(chosen["t"]) in found.clocks:
         reading.understood("times of day counted in seconds from the first")
-    size = os.fstat(stream.fileno()).st_size  # 0 for a pipe
     body = _Body(reading, found, {ours: columns.index(c) for ours, c in chosen.items()}, size)
     body.take("".join(sample.split("\n", found.first - 1)[found.first - 1 :]))
     for text in blocks:
@@ -154,12 +173,17 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     return body.table(columns, chosen)
 
 
+def _time_of(found: TableLayout, place: int) -> int:
+    """The column of time in front of a channel."""
+    return max((k for k in found.times if k <= place), default=0)
+
+
 def _layout(reading: Reading, sample: str) -> TableLayout:
     """The layout found in the first lines; notes how the file was interpreted."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
-    found = layout.find(reading, lines)
+    found = scopes.find(reading, lines) or layout.find(reading, lines)
     _refuse_wrong_delimiter(reading, found, lines)
     if found.kind:
         reading.understood(found.kind)
@@ -220,6 +244,8 @@ class _Body:
         self.names = layout.names
         self.dialect = layout.dialect
         self.wanted = frozenset(wanted.values())
+        if layout.times:
+            self.wanted |= {_time_of(layout, k) for k in self.wanted}
         self.size = size
         # Only the column t can hold times of day; in other columns they are text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
@@ -231,12 +257,16 @@ class _Body:
         # The columns that can be numeric; text columns and duplicates are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
-            k: np.empty(0) for k, name in enumerate(self.names) if (name and alike[name] == 1) or k in self.wanted
+            k: np.empty(0)
+            for k, name in enumerate(self.names)
+            if (name and alike[name] == 1) or k in self.wanted
         }
         self.text_columns: set[int] = set()
-        # Cells at the end of a line may be missing if their columns have no name and are not needed
+        # Cells at the end of a line may be missing if their columns have no name and are not needed, or end earlier
         named = [k + 1 for k, name in enumerate(self.names) if name or k in self.wanted]
-        self.fewest = max(named, default=len(self.names))
+        self.fewest = 1 if layout.times else max(named, default=len(self.names))
+        # A row of separators alone has no cell: spreadsheets write such rows where something once was
+        self.between = f" \t\f\v{layout.dialect.delimiter}"
         self.rows = 0
         self.line = layout.first - 1
         self.lines = Lines()
@@ -303,13 +333,34 @@ class _Body:
         reading.refuse_if_any()
         for x in self.stored.values():
             x.resize(self.rows, refcheck=False)
+        for k, factor in self.layout.scale.items():
+            self.stored[k] *= factor
         self._join_segments()
+        self._check_times(columns, chosen)
+        reading.notes += self.clock.notes
+        reading.origin = self.clock.first
         reading.left_out("without numbers", [self.names[k] for k in sorted(self.text_columns)])
         numeric = [c for k, c in enumerate(columns) if k not in self.text_columns]
         taken = {**chosen, **reading.further(numeric, chosen)}
         place = {c: k for k, c in enumerate(columns)}
         numbers = {name: self.stored[place[c]] for name, c in taken.items()}
         return reading.finished(numbers, taken, self.lines)
+
+    def _check_times(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> None:
+        """Raise RecordError if a column of time of another channel differs from that of the record."""
+        for c in chosen.values():
+            k = _time_of(self.layout, columns.index(c))
+            if self.time_column is None or not self.layout.times or k == self.time_column:
+                continue
+            t, other = self.stored[self.time_column], self.stored[k]
+            step = float(np.nanmedian(np.diff(t))) if len(t) > 1 else 0.0
+            apart = np.abs(other - t)
+            if np.isnan(other).any() != np.isnan(t).any() or float(np.nanmax(apart, initial=0.0)) > SAME_TIME * step:
+                raise self.reading.refuse(
+                    f"{printable(c.name)} has times of its own; export all channels with one sample "
+                    "time",
+                    self.layout.header,
+                )
 
     def _join_segments(self) -> None:
         """Put the rows of all segments on a common time axis. Raises RecordError if a segment begins before another
@@ -412,7 +463,7 @@ class _Body:
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []
         for line, row in enumerate(text.split("\n"), self.line + 1):
-            if not row.strip() or is_comment(row):
+            if not row.strip(self.between) or row == self.layout.ends or is_comment(row):
                 continue
             cells = self.dialect.cells(row)
             if not self.fewest <= len(cells) <= len(names):
@@ -423,7 +474,7 @@ class _Body:
                 continue
             lines.append(line)
             for k, numbers in values.items():
-                start, cell = cells[k]
+                start, cell = cells[k] if k < len(cells) else (len(row), "")
                 try:
                     number = self._number(k, cell)
                 except ValueError:
@@ -450,7 +501,7 @@ class _Body:
 
     def _bad_cell(self, column: int, cell: str, line: int, place: int) -> None:
         """Report a cell of a needed column that is not a number. The same fault in many cells counts as one problem."""
-        name = printable(self.names[column])
+        name = printable(self.names[column]) or f"#{column + 1}"
         if column == self.clock_column:
             kind, what, advice = "", "a time of day", "write every time like the first one"
         else:

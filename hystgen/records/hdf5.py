@@ -1,4 +1,4 @@
-"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
+"""HDF5, with netCDF-4 and NeXus, and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
 
 A record is one file: datasets behind external links, with external storage, or assembled from others (virtual) are not
 read, since that would open any file named in this file.
@@ -13,9 +13,10 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.records import mat_objects
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
 from hystgen.records.columns import Column, Step, from_number, is_named
-from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
+from hystgen.records.reading import MASKING, Matrix, Reading, Table, in_matrix, one_dimension, without_masked
 
 if TYPE_CHECKING:
     import h5py
@@ -51,12 +52,13 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         import h5py
     except ImportError:
         raise reading.uninstalled("MATLAB v7.3" if matlab else "HDF5", "h5py") from None
-    with reading.parsing(kind), h5py.File(reading.file, "r") as file:
+    with reading.parsing(kind), h5py.File(reading.path, "r") as file:
         columns: list[Column] = []
         ignored: list[str] = []
         outside: list[str] = []
         steps: list[Step] = []
         matrices: dict[str, Matrix] = {}
+        objects: dict[str, str] = {}
         join = "." if matlab else "/"  # MATLAB writes a field of a struct with a dot
 
         def link(path: str, found: object) -> None:
@@ -85,17 +87,46 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
             elif length:
                 unit = "" if matlab else _unit(found)
                 columns.append(Column(name, folder, unit, length, partial(_vector, reading, found)))
+            elif matlab and "MATLAB_object_decode" in found.attrs:
+                objects[folder + name] = _class(found)
+            elif not matlab and (fields := _of_rows(found, f"{folder}{name}/")):
+                columns.extend(fields)
             elif (step := _scalar(found, name, folder, matlab)) is not None:
                 steps.append(step)
             else:
                 ignored.append(folder + name)
                 if found.dtype.kind in "fiub" and in_matrix(found.shape or ()):
-                    matrices[folder + name] = found.shape, partial(found.__getitem__, ())
+                    matrices[folder + name] = found.shape, partial(_matrix, found)
 
         steps.extend(_attributes(file, ""))
         file.visititems(visit)
         file.visititems_links(link)
+        if objects and len(columns) < len(reading.need) and not matrices:
+            raise reading.refuse(mat_objects.advice(reading, objects))
+        ignored.extend(objects)
         return reading.table(columns, ignored, outside, steps, matrices)
+
+
+def _class(dataset: h5py.Dataset) -> str:
+    """MATLAB's class of a dataset."""
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    return bytes(kind).decode("ascii", "replace")
+
+
+def _of_rows(dataset: h5py.Dataset, folder: str) -> list[Column]:
+    """The fields of a dataset of rows that are numbers."""
+    if not dataset.dtype.names or not one_dimension(dataset.shape or ()):
+        return []
+    kinds = {name: dataset.dtype[name] for name in dataset.dtype.names}
+    return [
+        Column(name, folder, "", dataset.size, lambda name=name: np.array(dataset[name], np.float64).ravel())  # type: ignore[misc]
+        for name, kind in kinds.items()
+        if kind.kind in "fiub" and not kind.shape
+    ]
+
+
+def _matrix(dataset: h5py.Dataset) -> NDArray[np.float64]:
+    return without_masked(dataset[()], dataset.attrs)
 
 
 def _list_of_structs(reading: Reading, file: h5py.File, group: h5py.Group, folder: str) -> list[Column]:
@@ -160,8 +191,7 @@ def _length(dataset: h5py.Dataset, matlab: bool) -> int:
     """Length of a vector of numbers; 0 for anything else, including MATLAB's text, which is stored as numbers."""
     if dataset.shape is None or dataset.dtype.kind not in "fiub":
         return 0
-    kind = dataset.attrs.get("MATLAB_class", b"double")
-    if matlab and (bytes(kind).decode("ascii", "replace") not in MATLAB_NUMBERS or "MATLAB_empty" in dataset.attrs):
+    if matlab and (_class(dataset) not in MATLAB_NUMBERS or "MATLAB_empty" in dataset.attrs):
         return 0
     return one_dimension(dataset.shape)
 
@@ -186,10 +216,11 @@ def _vector(reading: Reading, dataset: h5py.Dataset) -> NDArray[np.float64]:
     chunk = dataset.chunks[axis] if dataset.chunks else 1
     step = chunk * max(1, SLICE // chunk)
     numbers = np.empty(length, dtype=np.float64)
+    masked = any(name in dataset.attrs for name in MASKING)
     for start in range(0, length, step):
         where: list[int | slice] = [0] * dataset.ndim
         where[axis] = slice(start, start + step)
         part = dataset[tuple(where)]
-        numbers[start : start + step] = part
+        numbers[start : start + step] = without_masked(part, dataset.attrs) if masked else part
         reading.tick(dataset.id.get_storage_size() * part.size / length)
     return numbers

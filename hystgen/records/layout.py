@@ -40,7 +40,9 @@ class TableLayout:
     `also`: second names for columns; `header`: line with the names, None if there is none; `first`: first line of the
     rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
     `clocks`: columns with times of day; `rows`: number of rows stated in the file; `another`: text that would begin
-    another table; `segments`: further headers among the rows, after which the table continues.
+    another table; `segments`: further headers among the rows, after which the table continues; `ends`: a line behind
+    the rows; `times`: the columns of time, if each is that of the channels behind it; `scale`: factors for columns of
+    codes.
     """
 
     dialect: Dialect
@@ -55,6 +57,9 @@ class TableLayout:
     rows: int | None = None
     another: str = ""
     segments: Segments | None = None
+    ends: str = ""
+    times: tuple[int, ...] = ()
+    scale: dict[int, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -255,6 +260,10 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableL
                     f"name columns by their numbers with --columns {EXAMPLES.get(view.width, EXAMPLE)}",
                     above[-1].number,
                 )
+        if reading.channel:
+            raise reading.refuse(
+                "the first line has numbers, not names; say which column is the time with --columns t=#1", first
+            )
         of = {1: "drive", 2: "drive, measured"}.get(view.width, "time, drive, measured")
         raise reading.refuse(
             f"the first line has numbers, not names; say which columns they are with --columns "

@@ -64,6 +64,29 @@ def problem(stream: IO[bytes]) -> str:
     return ""
 
 
+def objects(stream: IO[bytes]) -> dict[str, str]:
+    """The variables that are objects, by name with their classes; the walk stops as in `problem`."""
+    stream.seek(0)
+    head = stream.read(HEADER)
+    found: dict[str, str] = {}
+    if len(head) < HEADER or 0 in head[:4]:
+        return found
+    order = "<" if head[126:127] == b"I" else ">"
+    place = HEADER
+    while len(tag := stream.read(8)) == 8:
+        kind, size = struct.unpack(f"{order}II", tag)
+        place += 8 + size
+        elements = _Elements(stream if kind != COMPRESSED else _Unpacked(stream, size), order)
+        try:
+            if kind == COMPRESSED:
+                elements.matrix()
+            found |= elements.named_object()
+        except (EOFError, ValueError, zlib.error):
+            pass
+        stream.seek(place)
+    return found
+
+
 class _Unpacked:
     """The content of a compressed element."""
 
@@ -132,6 +155,22 @@ class _Elements:
         if kind != MATRIX or inside is not None:
             raise ValueError
         return size
+
+    def named_object(self) -> dict[str, str]:
+        """Name and class of an object, after the tag of the variable; nothing for any other variable."""
+        self._bytes(8)
+        (flags, _) = struct.unpack(f"{self._order}II", self._bytes(8))
+        if flags & 0xFF != OPAQUE:
+            return {}
+        name, _, kind = (self._text() for _ in range(3))
+        return {name: kind} if name else {}
+
+    def _text(self) -> str:
+        _, size, inside = self._tag()
+        if size > PIECE:
+            raise ValueError
+        data = self._bytes(size + -size % 8)[:size] if inside is None else inside
+        return data.decode("latin-1")
 
     def depths(self) -> Iterator[int]:
         """Depth of each array in a variable, starting after the tag of the variable itself."""

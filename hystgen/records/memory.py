@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import partial
 from typing import Any, Protocol, TypeGuard
 
@@ -81,6 +82,7 @@ def read(
 
 def _as_call(problem: str) -> str:
     """A message about a file, reworded to name arguments of a call instead of options."""
+    problem = re.sub("name the files .* with --join DRIVE MEASURED", "give the drive and the measured signal", problem)
 
     def argument(option: re.Match[str]) -> str:
         if option[1] is None:
@@ -128,29 +130,53 @@ def _table(reading: Reading, named: Mapping[str, object]) -> Table:
     columns: list[Column] = []
     ignored: list[str] = []
     for name, values in named.items():
-        numbers = _numbers(values)
+        numbers, timed = _numbers(values)
         length = 0 if numbers is None else one_dimension(numbers.shape)
         if numbers is not None and length:
-            unit = "s" if np.asarray(values).dtype.kind in "mM" else ""
+            unit = "s" if timed else ""
             columns.append(Column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
         else:
             ignored.append(name)
     return reading.table(columns, ignored)
 
 
-def _numbers(values: object) -> NDArray[np.generic] | None:
-    """An array of real numbers, with times as seconds from the first; None for anything else."""
+def _numbers(values: object) -> tuple[NDArray[np.generic] | None, bool]:
+    """An array of real numbers, NaN where masked, with times as seconds from the first; None for anything else; and
+    whether the numbers are times."""
     try:
         found = np.asarray(values)
     except ValueError:  # lists of different lengths
-        return None
+        return None, False
+    if isinstance(values, np.ma.MaskedArray) and found.dtype.kind in "fiub":
+        return np.ma.filled(values.astype(np.float64), np.nan), False
+    if found.dtype.kind == "O" and _are_times(values, found):
+        found = np.asarray(_in_utc(values), dtype="datetime64[ns]")
     if found.dtype.kind in "mM":
         known = found[~np.isnat(found)]
         origin = known[0] if found.dtype.kind == "M" and len(known) else np.timedelta64(0, "s")
-        return np.asarray((found - origin) / np.timedelta64(1, "s"), dtype=np.float64)
+        return np.asarray((found - origin) / np.timedelta64(1, "s"), dtype=np.float64), True
     if found.dtype.kind == "O":
         try:
-            return np.asarray(values, dtype=np.float64)  # a data frame knows which of its values are missing
+            # A data frame knows which of its values are missing
+            return np.asarray(values, dtype=np.float64), False
         except (TypeError, ValueError):
-            return None
-    return found if found.dtype.kind in "fiub" else None
+            return None, False
+    return (found if found.dtype.kind in "fiub" else None), False
+
+
+def _are_times(values: object, found: NDArray[np.generic]) -> bool:
+    """Whether the objects of an array are times, with a time zone or without."""
+    if getattr(getattr(values, "dtype", None), "kind", "") == "M":  # pandas, with a time zone
+        return True
+    first = next(iter(found.ravel().tolist()), None)
+    return isinstance(first, datetime)
+
+
+def _in_utc(values: object) -> object:
+    """Times without their time zones, which numpy does not know."""
+    if hasattr(values, "dtype") and values.dtype.kind == "M":
+        return values  # pandas converts them itself
+    return [
+        each.astimezone(UTC).replace(tzinfo=None) if isinstance(each, datetime) and each.tzinfo else each
+        for each in np.asarray(values).ravel().tolist()
+    ]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import logging
 import math
 import os
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from json import JSONDecodeError
 from pathlib import Path
 from types import MappingProxyType
 
@@ -17,7 +19,17 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.basics.problems import RecordError, counted, printable
-from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
+from hystgen.records.columns import (
+    DOUBTFUL,
+    LISTED,
+    STANDARD,
+    Column,
+    Finder,
+    Step,
+    counted_days,
+    further_names,
+    to_seconds,
+)
 from hystgen.records.record import Array, Record
 
 SAME_STEP = 1e-6
@@ -26,6 +38,8 @@ SAME_STEP = 1e-6
 BESIDE = 2
 """[times] Memory needed to read a record, relative to that of its numbers; sorted copies and masks take the rest.
 Measured: 1.7 with 2e7 samples from an HDF5 file (2026-11-26)."""
+
+IN_SECONDS = " in seconds, as it has no unit"
 
 NO_SECONDS = 1e11
 """Times this large are not seconds: seconds since 1970 reach this number in the year 5138, milliseconds did in 1973."""
@@ -85,7 +99,10 @@ class Reading:
 
     `delimiter`: the cell separator, None to infer it from the file; `fills`: for each column with numbers that stand
     for "no value", a phrase naming them; `points`: whether the file may lack a time; `read_as`: interpretations that
-    the file does not state plainly.
+    the file does not state plainly; `channel`: whether the file holds one channel of a record in several files;
+    `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
+    unpacked; `part`: the table, sheet or member that the user names behind the file; `origin`: nanoseconds since year 1
+    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it.
     """
 
     file: str
@@ -99,8 +116,15 @@ class Reading:
     notes: list[str] = field(default_factory=list)
     fills: dict[str, str] = field(default_factory=dict)
     read_as: list[str] = field(default_factory=list)
+    channel: bool = False
+    name: str = ""
+    path: str = ""
+    part: str = ""
+    origin: int | None = None
+    start: str = ""
 
     def __post_init__(self) -> None:
+        self.name, self.path = self.name or Path(self.file).name, self.path or self.file
         if self.delimiter in ("\\t", "tab"):
             self.delimiter = "\t"
 
@@ -118,9 +142,30 @@ class Reading:
         self.problem(text, line)
         return RecordError(self.problems)
 
-    def uninstalled(self, files: str, package: str, others: str = "CSV, .npz or MATLAB .mat (v7)") -> RecordError:
+    def refuse_at(self, text: str, failure: JSONDecodeError, line: int = 0) -> RecordError:
+        """The error to raise for text that is not JSON, in this line, or else in that of the failure."""
+        self.problem(text, line or failure.lineno, failure.colno)
+        return RecordError(self.problems)
+
+    def uninstalled(
+        self, files: str, package: str, others: str = "CSV, .npz or MATLAB .mat (v7)", extra: str = "formats"
+    ) -> RecordError:
         """The error to raise for files whose package is not installed; `others`: formats that do not need it."""
-        return self.refuse(f"{files} files need the package {package}; {extras.install('formats')}, or export {others}")
+        return self.refuse(f"{files} files need the package {package}; {extras.install(extra)}, or export {others}")
+
+    def take_part(self, what: str, names: Sequence[str], advice: str = "name one behind the file") -> str:
+        """The one of several tables in a file that is to be read: the only one, or the one that the user names.
+
+        Raises RecordError with all names if it is not clear which.
+        """
+        if self.part in names or (len(names) == 1 and not self.part):
+            return self.part or names[0]
+        if not names:
+            raise self.refuse(f"has no {what}s")
+        shown = ", ".join(map(printable, names[:LISTED])) + (f" and {len(names) - LISTED} more" * (len(names) > LISTED))
+        base = self.file.removesuffix(f"/{self.part}") if self.part else self.file
+        wrong = f"no {what} {printable(self.part)} among" if self.part else f"{len(names)} {what}s:"
+        raise self.refuse(f"has {wrong} {shown}; {advice}, as in {base}/{printable(names[-1])}")
 
     def refuse_if_any(self) -> None:
         """Raise RecordError with the problems found so far, if any."""
@@ -152,13 +197,16 @@ class Reading:
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None, steps, self.points)
+        found = finder.find(self.need, self.sample_time is not None, steps, self.points, self.channel)
+        if finder.problems:
+            self._check_lengths(found)
         for text in finder.problems:
             self.problem(text, line)
-        steps = finder.steps
-        if len({step.start for step in steps}) > 1:
-            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
+        if len({step.start for step in finder.stated}) > 1:
+            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in finder.stated)
             self.problem(f"the columns start at different times: {starts}; export them with a common time", line)
+        steps = finder.steps
+        self.start = next((step.start for step in finder.stated), "")
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, but the file has {said}; give --sample-time", line)
@@ -167,7 +215,7 @@ class Reading:
             no_unit = "t" in finder.understood and not found["t"].unit
             self.understood(
                 ", ".join(
-                    f"{ours} = {printable(c.own)}{' in seconds, as it has no unit' if ours == 't' and no_unit else ''}"
+                    f"{ours} = {printable(c.own)}{IN_SECONDS if ours == 't' and no_unit else ''}"
                     for ours, c in sorted(found.items(), key=lambda entry: (*STANDARD, entry[0]).index(entry[0]))
                 )
             )
@@ -175,6 +223,12 @@ class Reading:
             self.sample_time = steps[0].seconds
             self.understood(f"time from {steps[0].said}")
         return found
+
+    def _check_lengths(self, chosen: Mapping[str, Column]) -> None:
+        """Raise RecordError if columns differ in length."""
+        if len({c.length for c in chosen.values()}) > 1:
+            parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
+            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
         """The columns not requested, keyed by the names they get; a column whose name is taken is noted."""
@@ -198,22 +252,24 @@ class Reading:
         outside: Sequence[str] = (),
         steps: Sequence[Step] = (),
         matrices: Mapping[str, Matrix] = MappingProxyType({}),
+        together: bool = False,
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
         The table has the requested columns and, from the groups that hold them, all others of the same length, except
         those that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`:
-        shapes and readers by name; in a file without vectors, a single matrix is the record.
+        shapes and readers by name; in a file without vectors, a single matrix is the record. `together`: the groups
+        form one record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
-            columns, ignored = self._of_matrix(name, shape, read), [other for other in ignored if other != name]
+            steps = [replace(step, of="") if step.of == name else step for step in steps]
+            columns = self._of_matrix(name, shape, read, steps)
+            ignored = [each for each in ignored if each != name]
         chosen = self.chosen(columns, ignored, outside, steps=steps)
-        lengths = {c.length for c in chosen.values()}
-        if len(lengths) > 1:
-            parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
-            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
-        folders = {c.folder for c in chosen.values()}
+        self._check_lengths(chosen)
+        lengths = {c.length for c in chosen.values()} or {max((c.length for c in columns), default=0)}
+        folders = {c.folder for c in (columns if together or not chosen else chosen.values())}
         self.left_out("without numbers", ignored)
         self.left_out("stored outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
@@ -228,11 +284,19 @@ class Reading:
             numbers[name] = np.require(c.read(), np.float64, ("C", "W"))
         return self.finished(numbers, taken)
 
-    def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]]) -> list[Column]:
+    def address(self, c: Column) -> str:
+        """How to refer to a column in `--columns`: as the user did, or by its name."""
+        return self.columns.get("t", "").partition(" [")[0] or printable(c.name)
+
+    def _of_matrix(
+        self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]], steps: Sequence[Step]
+    ) -> list[Column]:
         """The columns of a matrix. Raises RecordError unless the user names them by number."""
         width = in_matrix(shape)
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
-            example = "1,2 (drive, measured) with --sample-time" if width == 2 else "1,2,3 (time, drive, measured)"
+            example = "1,2,3 (time, drive, measured)"
+            if width == 2 or steps:
+                example = f"1,2 (drive, measured){'' if steps else ' with --sample-time'}"
             raise self.refuse(
                 f"{printable(name)} is a matrix of {width} columns; say which they are with --columns {example}"
             )
@@ -253,11 +317,21 @@ class Reading:
             x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
-            name = printable(taken["t"].own)
             raise self.refuse(
-                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after its '
-                f'name, "{name} [ms]"'
+                f'the numbers of "{printable(taken["t"].own)}" are too large to be seconds, and it has no unit; give '
+                f'one, --columns "t={self.address(taken["t"])} [ms]" for milliseconds, or write it after its name'
             )
+        if "t" in numbers and "t" not in units and (counts := counted_days(numbers["t"], taken["t"].own)):
+            if counts == DOUBTFUL:
+                address = self.address(taken["t"])
+                raise self.refuse(
+                    f'the numbers of "{printable(taken["t"].own)}", from {numbers["t"][0]:.10g} on, may be seconds or '
+                    f'days since 1900, and it has no unit; give it one, --columns "t={address} [d]" for days or '
+                    f'--columns "t={address} [s]" for seconds'
+                )
+            self.read_as = [said.replace(IN_SECONDS, "") for said in self.read_as]
+            self.understood(counts)
+            units["t"] = "d"
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])
             if note:
@@ -270,6 +344,38 @@ MOST_TOGETHER = 64
 """Largest number of columns in a matrix that may be a record; a wider one is an image or a map."""
 
 
+MASKING = ("_FillValue", "missing_value", "valid_min", "valid_max", "valid_range", "scale_factor", "add_offset")
+"""Attributes by which stored numbers differ from those meant."""
+
+
+def without_masked(numbers: NDArray[np.generic], attributes: Mapping[str, object]) -> NDArray[np.float64]:
+    """Numbers as the attributes of netCDF's conventions say: NaN for fill values and for those outside the valid range,
+    then scaled; unchanged without such attributes."""
+    if not any(name in attributes for name in MASKING):
+        return np.asarray(numbers, dtype=np.float64)
+
+    def of(*names: str) -> NDArray[np.float64]:
+        found = [np.ravel(np.asarray(attributes[name])) for name in names if name in attributes]
+        return np.concatenate([each for each in found if each.dtype.kind in "fiub"] or [np.empty(0)]).astype(np.float64)
+
+    x = np.asarray(numbers, dtype=np.float64)
+    low, high = of("valid_min"), of("valid_max")
+    span = of("valid_range")
+    if len(span) == 2:
+        low, high = span[:1], span[1:]
+    wrong = np.isin(x, of("_FillValue", "missing_value"))
+    for ends, outside in ((low, np.less), (high, np.greater)):
+        if len(ends):
+            wrong |= outside(x, ends[0])
+    x = np.where(wrong, np.nan, x)
+    factor, offset = of("scale_factor"), of("add_offset")
+    if len(factor) == 1:
+        x *= factor[0]
+    if len(offset) == 1:
+        x += offset[0]
+    return x
+
+
 def in_matrix(shape: tuple[int, ...]) -> int:
     """Number of columns in a matrix that may be a record, in either orientation; 0 for anything else."""
     two = len(shape) == 2 and shape[0] != shape[1]
@@ -280,6 +386,18 @@ def one_dimension(shape: tuple[int, ...]) -> int:
     """Length of a vector, whether a row, a column or one-dimensional; 0 for anything else."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
+
+
+@contextmanager
+def unlogged(library: str) -> Iterator[None]:
+    """Keep a library from logging what is wrong with a file, which is reported once, as a problem."""
+    logger = logging.getLogger(library)
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 class CountingFile(io.FileIO):
@@ -312,6 +430,7 @@ NOTED_GAP = 3.0
 def repaired(reading: Reading, table: Table) -> Record:
     """The record made from a table, which is consumed. Raises RecordError with every problem."""
     columns = table.numbers
+    _cut(columns, {*reading.need, "t"} & columns.keys())
     length = len(next(iter(columns.values()), ()))
     keep = np.ones(length, dtype=bool)
     needed = [name for name in reading.need if name in columns]
@@ -353,8 +472,17 @@ def repaired(reading: Reading, table: Table) -> Record:
         t = np.arange(samples, dtype=np.float64) * step
     v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
     y = columns.pop("y", None)
-    name, read_as = Path(reading.file).name, "; ".join(reading.read_as)
-    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
+    read_as = "; ".join(reading.read_as)
+    return Record(reading.name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
+
+
+def _cut(columns: dict[str, Array], needed: Set[str]) -> None:
+    """Cut the rows at the end without any needed number: those of other, longer columns."""
+    if not needed or any(not len(columns[name]) or math.isfinite(columns[name][-1]) for name in needed):
+        return
+    last = max(int(np.flatnonzero(np.isfinite(columns[name]))[-1:].sum()) for name in needed)
+    for name in columns:
+        columns[name] = columns[name][: last + 1]
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
@@ -391,10 +519,16 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     row = int(rows[int(np.argmin(steps)) + 1])
     given = reading.sample_time
     if given is None:
-        mean = float(t[rows[-1]] - t[rows[0]]) / float(rows[-1] - rows[0])
+        # Between two changes of the written time, samples are counted to one; the record does not end at a change
+        rises = np.flatnonzero(steps > 0.0) + 1
+        first, last = (rises[0], rises[-1]) if len(rises) > 1 else (0, -1)
+        span = float(t[rows[last]] - t[rows[first]])
+        mean = span / float(rows[last] - rows[first])
+        digits = 3 + max(0, math.ceil(math.log10(span / finest)))  # so that over the record it is off by a small part
         reading.problem(
             f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, because it was written in "
-            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
+            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.{digits}g}), or export it with more "
+            "digits",
             table.line(row),
         )
         return t

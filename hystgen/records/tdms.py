@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.records.columns import Column, Step
+from hystgen.records.parquet import SINCE_YEAR_1
 from hystgen.records.reading import Reading, Table
 
 if TYPE_CHECKING:
@@ -64,5 +65,6 @@ def _vector(reading: Reading, channel: TdmsChannel) -> NDArray[np.generic]:
     if numbers.dtype.kind != "M":
         return numbers
     reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds since the first")
+    reading.origin = int(numbers[0].astype("datetime64[ns]").astype(np.int64)) + SINCE_YEAR_1
     seconds: NDArray[np.float64] = (numbers - numbers[0]).astype("timedelta64[ns]").astype(np.int64) / NANO
     return seconds
