@@ -304,14 +304,22 @@ class Diagnosis:
         """The judgement on each effect that the user named."""
         said = []
         for each in self.result.effects:
-            if each.known and each.unsupported is None:
-                before, after = self._rms(each.holdout_before), self._rms(each.holdout_after)
-                gain = f"it takes the held-out rms error from {before} to {after} (p = {each.p_value:.1g})"
-                said.append(f"You named {each.name}, and the records support it: {gain}")
-            elif each.known:
-                why = f"the records do not support it: {each.unsupported}"
-                said.append(f"You named {each.name}, so it is written, but {why} (p = {each.p_value:.1g})")
+            if not each.known:
+                continue
+            gain = f"from {self._rms(each.holdout_before)} to {self._rms(each.holdout_after)}, p = {each.p_value:.1g}"
+            if each.unsupported is None:
+                said.append(f"You named {each.name}, and the records support it: held-out rms error {gain}")
+            else:
+                why = f"{each.unsupported} (held-out rms error {gain})"
+                said.append(f"You named {each.name}, so it is written, but the records do not support it: {why}")
         return said
+
+    @property
+    def _harmful(self) -> str:
+        """The effects that the user named and that raise the held-out error; empty if none does."""
+        raise_it = 1.0 + acceptance.BETTER
+        found = [each for each in self.result.effects if each.unsupported is not None]
+        return " and ".join(each.name for each in found if each.holdout_after > raise_it * each.holdout_before)
 
     def _finding(self) -> str:
         """The verdict itself."""
@@ -347,6 +355,8 @@ class Diagnosis:
         """The beginning of a verdict that names no effect."""
         if self._of_another_kind():
             return "No effect is named"
+        if self._harmful:
+            return f"Part of the error may come from {self._harmful}, which you named"
         if self._closest() is None:
             return "Something is missing that the catalogue does not contain or the records cannot show"
         return "Something is missing, and no effect is named"

@@ -62,7 +62,7 @@ def added(now: Fitted, names: Sequence[str], records: Records) -> Known:
         chosen[name], tried[name] = _best(now, name, records)
         now = chosen[name].fitted
     for name in names[:-1]:
-        less = selection.without_effect(now, name, records)
+        less = selection.without_refit(now, name, records)  # a refit could move the others' parameters far
         if less is None:
             continue
         other, shapes = _best(less, name, records)

@@ -870,7 +870,7 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
-            start = _without_refit(now, old.name, records)  # a refit could move the others' parameters far
+            start = without_refit(now, old.name, records)  # a refit could move the others' parameters far
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
@@ -1020,7 +1020,7 @@ def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
     return records.restarted(fits.fit(smaller[0], records.quick, smaller[1], now.weights))
 
 
-def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
+def without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
     """The hypothesis without one effect, with the others' parameters unchanged."""
     smaller = _less(now, name)
     if smaller is None:
