@@ -12,7 +12,7 @@ import click
 from hystgen.basics import console
 from hystgen.basics.version import __version__
 
-COMMANDS = ("emit", "verify", "simulate", "identify", "diagnose", "track", "show", "schema")
+COMMANDS = ("emit", "verify", "simulate", "identify", "diagnose", "track", "compare", "show", "schema")
 """The commands, each in a module of the same name."""
 
 
