@@ -24,7 +24,7 @@ from hystgen.diagnosis.search.hypothesis import NotFiniteError
 from hystgen.identification import quality
 from hystgen.identification.fit import visited
 from hystgen.model import Model, ModelSource, as_model
-from hystgen.records import Record, Source, in_units, read_records, several
+from hystgen.records import Source, in_units, read_records, several
 from hystgen.records.units import conversion
 
 if TYPE_CHECKING:
@@ -292,7 +292,7 @@ def compare(
     units = loaded[0].parameters.units
     for name, model in zip(named, loaded, strict=True):
         _check_units(name, model.parameters.units, named[0], units)
-    read = _labelled(in_units(read, units, sources=given), loaded[0])
+    read = in_units(read, units, sources=given)
     before = None if history is None else visited(history)
     items, notes = preparing.to_judge(read, before, rest, skip)
     compared = [item for item in items if item.known.any()]
@@ -300,12 +300,10 @@ def compare(
         raise RecordError([f"{read[0].name}: error: no sample can be compared; give --history, or another record"])
     rows = []
     for name, model in zip(named, loaded, strict=True):
-        own, factor = compared, 1.0
-        if model.parameters.units != units:
-            found, _ = preparing.to_judge(in_units(read, model.parameters.units), before, rest, skip)
-            own = [item for item in found if item.known.any()]
-            factor = _factor(model.parameters.units.output, units.output)
-        rows.append(_deviation(name, model, own, factor))
+        theirs = model.parameters.units
+        drive, output = _factor(units.input, theirs.input, "v"), _factor(units.output, theirs.output, "y")
+        own = [_scaled(item, drive, output) for item in compared]
+        rows.append(_deviation(name, model, own, 1.0 / output))
         notes += [note for item in own if (note := _outside(name, model, item))]
     line = Deviation(LINE, (), tuple(_off_line(compared)))
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *notes]
@@ -334,13 +332,6 @@ def _names(sources: Sequence[object], models: Sequence[Model]) -> Sequence[str]:
     return found
 
 
-def _labelled(records: Sequence[Record], model: Model) -> list[Record]:
-    """The records, with a model's units where they have none, so that other models can convert them."""
-    own = {"v": model.parameters.units.input, "y": model.parameters.units.output}
-    own = {column: unit for column, unit in own.items() if unit}
-    return [replace(record, units={**own, **record.units}) for record in records]
-
-
 def _check_units(name: str, own: Units, first: str, units: Units) -> None:
     """Raise ValueError if a model's units are of other quantities than those of the first model."""
     for key, column, what in (("input", "v", "drive"), ("output", "y", "output")):
@@ -352,10 +343,25 @@ def _check_units(name: str, own: Units, first: str, units: Units) -> None:
             )
 
 
-def _factor(own: str, unit: str) -> float:
-    """The factor from a model's output unit to another of the same quantity; 1 if either is not given."""
-    how = conversion(own, unit, "y") if own and unit else None
+def _factor(unit: str, to: str, column: str) -> float:
+    """The factor from one unit to another of the same quantity; 1 if either is not given."""
+    how = conversion(unit, to, column) if unit and to else None
     return 1.0 if how is None else float(how.times)
+
+
+def _scaled(item: Item, drive: float, output: float) -> Item:
+    """An item in units of which the old ones are `drive` and `output` times as large."""
+    if drive == output == 1.0:
+        return item
+
+    def driven(values: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        return None if values is None else tuple(drive * v for v in values)
+
+    return replace(
+        item, run=replace(item.run, v=drive * item.run.v), y=output * item.y, history=driven(item.history),
+        output_range=output * item.output_range, turns=driven(item.turns),
+        session=None if item.session is None else replace(item.session, v=drive * item.session.v),
+    )
 
 
 def _deviation(name: str, model: Model, items: Sequence[Item], factor: float) -> Deviation:
