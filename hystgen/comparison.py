@@ -123,10 +123,8 @@ class Comparison:
         for each in (self.line, *self.models):
             costs = ("",) * 3 if each.cost is None else tuple(map(str, vars(each.cost).values()))
             whole = 100.0 / self.output_range
-            found.append((
-                each.name, ", ".join(each.effects) or "-", f"{each.rms:.4g}", f"{whole * each.rms:.3f}",
-                f"{each.most:.4g}", f"{whole * each.most:.3f}", f"{each.rms / self.noise:.3g}", *costs,
-            ))  # fmt: skip
+            errors = [text for x in (each.rms, each.most) for text in (f"{x:.4g}", f"{whole * x:.3f}")]
+            found.append((each.name, ", ".join(each.effects) or "-", *errors, f"{each.rms / self.noise:.3g}", *costs))
         kept = [k for k in range(len(head)) if any(row[k] for row in found[1:])]
         return [tuple(row[k] for k in kept) for row in found]
 
@@ -203,7 +201,7 @@ class Comparison:
             return {
                 "name": each.name, "effects": list(each.effects), "rms": each.rms, "max": each.most, **ranged,
                 "times_noise": each.rms / self.noise, "records": by_record, "cost": cost,
-            }  # fmt: skip
+            }
 
         tied = [self.models[0].name, *(each.name for each in self.tied)]
         return {
@@ -211,7 +209,7 @@ class Comparison:
             "records": [each.name for each in self.records], "straight_line": entry(self.line),
             "models": [entry(each) for each in self.models], "closest": tied, "sentence": self.sentence(),
             "notes": list(self.notes),
-        }  # fmt: skip
+        }
 
     def to_json(self) -> str:
         """The comparison for programs."""
@@ -311,7 +309,7 @@ def compare(
         units.output, tuple(Compared(item.name, item.run.t, item.run.v, item.y) for item in compared), line,
         tuple(sorted(rows, key=lambda each: each.rms)), noise_floor(compared).rms,
         max(float(np.ptp(item.y[item.known])) for item in compared), tuple(dict.fromkeys(notes)),
-    )  # fmt: skip
+    )
 
 
 def _single(models: object) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import click
 
@@ -76,8 +76,9 @@ def compare(
     files = list(dict.fromkeys(params))
     models: list[Model] = common.for_each(files, partial(common.load_model, effects=effects))
     visited = common.history_values(history)
-    how: dict[str, Any] = {"history": visited, "rest": rest, "skip": skip, **common.reading_options(**reading)}
-    found = common.guarded(params[0], lambda: report.compare(models, holdout, names=files, **how))
+    how = common.reading_options(**reading)
+    compared = partial(report.compare, models, holdout, names=files, history=visited, rest=rest, skip=skip, **how)
+    found = common.guarded(params[0], compared)
     for note in found.notes:
         console.note(f"warning: {note}")
     console.say(found.table())

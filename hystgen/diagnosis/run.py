@@ -26,7 +26,7 @@ from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.known import Known
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
-from hystgen.effects import FRONTS
+from hystgen.effects import CATALOGUE, FRONTS
 from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, auto, quality, stage_content
 from hystgen.identification.fit import visited
@@ -97,7 +97,7 @@ def diagnose(
     arguments.number("skip", skip, "seconds", 0.0)
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects must be classes, as hystgen.effects.load_user_effects returns them")
-    named = arguments.words("known", known, "creep")
+    named = arguments.words("known", known, CATALOGUE[0])
     there = [*(effect.name for effect in model.effects), *(FRONTS[:1] if model.cascade.stages else ())]
     known_effects.check(named, effects, there)
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)

@@ -10,16 +10,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics import arguments
+from hystgen.basics import arguments, foreign
 from hystgen.basics.problems import RecordError
 from hystgen.records.columns import STANDARD, Column
 from hystgen.records.reading import Reading, Table, one_dimension, repaired
 from hystgen.records.record import Record
+from hystgen.records.units import converted, wanted
+
+if TYPE_CHECKING:
+    from hystgen.parameters.schema import Units
 
 
 class Frame(Protocol):
@@ -43,6 +47,7 @@ _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
 
 def in_memory(source: object) -> TypeGuard[Columns]:
     """Whether something holds the samples of one record, judged by its type alone."""
+    foreign.refuse("a record", source)
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
     # A list may contain paths or records, so only tuples hold arrays
@@ -77,6 +82,28 @@ def read(
         return repaired(reading, _table(reading, _named(source, name, sample_time)))
     except RecordError as error:
         raise RecordError(map(_as_call, error.problems)) from None
+
+
+def whole(source: Columns, column: str, units: Units | None) -> Record:
+    """Every sample of a frame, NaN where a value is missing, as a record for a model that answers to `column`.
+
+    `units`: those to which it is converted, None for codes, which have no unit. Raises RecordError, ValueError and
+    TypeError as `read` does; the record has no time (`timed`) if the frame has none.
+    """
+    reading = Reading("the frame", {}, None, None, (column,), lambda _: None, points=True)
+    try:
+        table = _table(reading, _named(source, "the frame", None))
+    except RecordError as error:
+        raise RecordError(map(_as_call, error.problems)) from None
+    numbers, timed = dict(table.numbers), "t" in table.numbers
+    t = numbers.pop("t", np.arange(len(numbers[column]), dtype=np.float64))
+    if units is None and (unit := table.units.get(column)):
+        raise ValueError(f"column {column} is in {unit}, but fixed point takes codes; pass codes, without a unit")
+    v = numbers.pop("v", np.empty(0))
+    record = Record("the frame", t, v, numbers.pop("y", None), numbers, units=table.units, timed=timed)
+    if units is None:
+        return record
+    return converted([record], wanted(units, ("", {}), ("units", {})), (column,), (), "")[0]
 
 
 def _as_call(problem: str) -> str:

@@ -97,8 +97,8 @@ def _bars(axes: Axes, found: Comparison, width: float) -> None:
     for k, each in enumerate(every):
         colour = drawing.RESIDUAL if each.name in closest else drawing.QUIET if each is found.line else drawing.MODEL
         axes.plot(max(each.rms, 1e-300), k, "o", color=colour, markersize=8)
-        axes.annotate(f"{each.rms:.3g}", (max(each.rms, 1e-300), k), (8.0, 0.0), textcoords="offset points",
-                      va="center", fontsize=9)  # fmt: skip
+        place = max(each.rms, 1e-300), k
+        axes.annotate(f"{each.rms:.3g}", place, (8.0, 0.0), textcoords="offset points", va="center", fontsize=9)
     axes.axvline(found.noise, color=drawing.FAULT, linestyle="--", linewidth=1.1, label="noise")
     axes.set_xscale("log")
     low, high = min(found.noise, *(each.rms for each in every)), max(each.rms for each in every)
