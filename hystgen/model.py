@@ -308,7 +308,8 @@ class Model:
         """
         given = self.given("v", v, arithmetic, t, extra)
         y, said = self.answers(given.samples, arithmetic, clamp, engine, t=given.t, extra=given.extra)
-        remarks.tell([*given.notes, *said])
+        given.tell()
+        remarks.tell(said)
         return given.answer(y)
 
     def given(
@@ -472,7 +473,8 @@ class InverseModel:
         """
         given = self.forward.given("u", u, arithmetic, t, extra)
         v, said = self.answers(given.samples, arithmetic, clamp, engine, t=given.t, extra=given.extra)
-        remarks.tell([*given.notes, *said])
+        given.tell()
+        remarks.tell(said)
         return given.answer(v)
 
     def answers(

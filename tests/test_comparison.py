@@ -106,8 +106,10 @@ def test_the_order_is_said_with_what_the_records_can_tell() -> None:
         "They are closer than c."
     )
     noisy = told([deviation("a", 1.00e-3, 1), deviation("b", 1.05e-3, 2)])
-    assert noisy.sentence() == "a and b cannot be told apart on these records: the difference is within the noise. They leave no " \
-        "more than noise."
+    assert noisy.sentence() == (
+        "a and b cannot be told apart on these records: the difference is within the noise. They leave no more than "
+        "noise."
+    )
     rng = random.Random(5)
     slow = [np.repeat([rng.gauss(0.0, s) for _ in range(20)], 200) for s in (0.02, 0.024)]
     chance = told([Deviation(name, (), (values,)) for name, values in zip("ab", slow, strict=True)])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -36,6 +37,11 @@ class Given:
     answer: Callable[[Array], Array] = _array
     notes: tuple[str, ...] = ()
 
+    def tell(self) -> None:
+        """Warn of every conversion, at the call of the user's code."""
+        for note in self.notes:
+            warnings.warn(note, stacklevel=3)
+
 
 def given(
     column: str, answer: str, source: object, t: ArrayLike | None, extra: Mapping[str, ArrayLike] | None,
@@ -49,16 +55,35 @@ def given(
     """
     foreign.refuse(column, source)
     like = partial(foreign.alike, source, answer) if foreign.package(source) else _array
-    if not (isinstance(source, Mapping) or hasattr(source, "columns") or hasattr(source, "column_names")):
-        return Given(_numbers(column, source) if like is not _array else source, t, extra, like)  # type: ignore[arg-type]
-    try:
-        found = memory.whole(source, column, units)  # type: ignore[arg-type]
-    except RecordError as error:
-        raise ValueError("\n".join(error.problems)) from None
-    columns = found.columns()
-    samples, time = columns.pop(column), columns.pop("t") if found.timed else None
-    columns.pop("t", None)
-    return Given(samples, time if t is None else t, {**columns, **(extra or {})}, like, found.notes)
+    if isinstance(source, Mapping) or hasattr(source, "columns") or hasattr(source, "column_names"):
+        try:
+            found = memory.whole(source, column, units)  # type: ignore[arg-type]
+        except RecordError as error:
+            raise ValueError(_unclear(column, error.problems)) from None
+        columns = found.columns()
+        samples, times = columns.pop(column), columns.pop("t")
+        t = times if t is None and found.timed else t
+        return Given(samples, t, {**columns, **(extra or {})}, like, found.notes)
+    if like is _array:
+        return Given(source, t, extra)  # type: ignore[arg-type]
+    return Given(_numbers(column, source), _times(source) if t is None else t, extra, like)
+
+
+def _unclear(column: str, problems: Sequence[str]) -> str:
+    """The message for a frame whose columns cannot be used, with advice that a call of `simulate` can follow."""
+    plain = [each.partition(": error: ")[2] or each for each in problems]
+    own = [each for each in plain if f'"{column}"' in each] or plain
+    said = "; ".join(each.partition("; ")[0] for each in own)
+    return f"{said}; rename the columns to {column} and t, or pass the samples themselves, and the time as t="
+
+
+def _times(source: object) -> Array | None:
+    """The times in s, from the first on, in the index of a series or the coordinates of an array; None without any."""
+    index = getattr(source, "index", None)
+    if index is None or callable(index):
+        (dim,) = getattr(source, "dims", None) or (None,)
+        index = source.coords[dim].values if dim in getattr(source, "coords", ()) else None  # type: ignore[attr-defined]
+    return memory.numbers_of(index) if getattr(getattr(index, "dtype", None), "kind", "") in ("m", "M") else None
 
 
 def _numbers(name: str, source: object) -> Array:
@@ -66,5 +91,5 @@ def _numbers(name: str, source: object) -> Array:
     found = np.asarray(source)
     if found.dtype.kind == "O":
         with contextlib.suppress(TypeError, ValueError):
-            found = np.asarray(source, dtype=np.float64)
-    return arguments.signal(name, found)
+            return np.asarray(source, dtype=np.float64)
+    return arguments.signal(name, source)

@@ -155,20 +155,26 @@ def _table(reading: Reading, named: Mapping[str, object]) -> Table:
     columns: list[Column] = []
     ignored: list[str] = []
     for name, values in named.items():
-        numbers = _numbers(values)
-        length = 0 if numbers is None else one_dimension(numbers.shape)
+        numbers = numbers_of(values)
+        length = 0 if numbers is None else numbers.size if numbers.ndim == 1 else one_dimension(numbers.shape)
         if numbers is not None and length:
-            unit = "s" if np.asarray(values).dtype.kind in "mM" else ""
+            unit = "s" if _kind(values) in ("m", "M") else ""
             columns.append(Column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
         else:
             ignored.append(name)
     return reading.table(columns, ignored)
 
 
-def _numbers(values: object) -> NDArray[np.generic] | None:
+def _kind(values: object) -> str:
+    """The kind of an array's or a series' values as numpy names it; zoned stamps, too, are M."""
+    kind = getattr(getattr(values, "dtype", None), "kind", None)
+    return kind if isinstance(kind, str) else np.asarray(values).dtype.kind
+
+
+def numbers_of(values: object) -> NDArray[np.generic] | None:
     """An array of real numbers, with times as seconds from the first; None for anything else."""
     try:
-        found = np.asarray(values)
+        found = np.asarray(values, dtype="datetime64[ns]" if _kind(values) == "M" else None)  # a zoned stamp in UTC
     except ValueError:  # lists of different lengths
         return None
     if found.dtype.kind in "mM":

@@ -231,7 +231,19 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         first = next(iter(self.figures.values()), None)
-        return display.block(repr(self), self.sentence(), None if first is None else partial(first, self))
+        draw = None if first is None else partial(first, self)
+        return display.block(repr(self), self.sentence(), draw, self.rows())
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A table of the effects: a header, then the held-out error with each; empty without effects."""
+        unit = f" [{self.result.unit}]" if self.result.unit else ""
+        head = ("effect", f"held-out rms before{unit}", f"after{unit}", "share of the gap", "p", "supported")
+        found = []
+        for each in self.result.effects:
+            errors = f"{each.holdout_before:.4g}", f"{each.holdout_after:.4g}", f"{100.0 * each.share_of_gap:.0f} %"
+            supported = "yes" if each.unsupported is None else "no"
+            found.append((each.name, *errors, f"{each.p_value:.1g}", supported))
+        return [head, *found] if found else []
 
     @property
     def model(self) -> Model:
