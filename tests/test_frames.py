@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
-import pandas as pd  # type: ignore[import-untyped]
+import pandas as pd
 import polars as pl
 import pytest
 import xarray as xr

@@ -133,7 +133,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
     numbers = [["effect", "parameter", "value", "95 % from", "to", "what it is"]]
     for effect in result.effects:
         before, after = effect.holdout_before, effect.holdout_after
-        share = f"{100.0 * effect.share_of_gap:.0f} %"
+        share = f"{round(100.0 * effect.share_of_gap)} %"
         named_by = "the search" if not effect.known else "you; the records support it" if effect.unsupported is None \
             else f"you; the records do not support it: {effect.unsupported}"
         rows.append([effect.name, f"{before:.4g}", f"{after:.4g}", share, _chance(effect.p_value), named_by])

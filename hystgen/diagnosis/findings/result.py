@@ -240,7 +240,7 @@ class Diagnosis:
         head = ("effect", f"held-out rms before{unit}", f"after{unit}", "share of the gap", "p", "supported")
         found = []
         for each in self.result.effects:
-            errors = f"{each.holdout_before:.4g}", f"{each.holdout_after:.4g}", f"{100.0 * each.share_of_gap:.0f} %"
+            errors = f"{each.holdout_before:.4g}", f"{each.holdout_after:.4g}", f"{round(100.0 * each.share_of_gap)} %"
             supported = "yes" if each.unsupported is None else "no"
             found.append((each.name, *errors, f"{each.p_value:.1g}", supported))
         return [head, *found] if found else []
