@@ -60,10 +60,11 @@ def compare(
     Example: hystgen compare plain.yaml diagnosis/params.yaml --holdout other.csv -o comparison/
     """
     from hystgen.basics import drawing, extras, writing
+
+    common.guarded(params[0], partial(extras.require_fit, "compare", plot=bool(plot or output)))
     from hystgen.comparison import Comparison
     from hystgen.report import comparison as report
 
-    common.guarded(params[0], partial(extras.require_fit, "compare", plot=bool(plot or output)))
     inside = [Path(output) / name for name in Comparison.FILES] if output else []
     common.keep_inputs([plot, json_file, *inside], [*params, *holdout])
     if json_file:
