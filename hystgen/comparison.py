@@ -170,7 +170,9 @@ class Comparison:
     def sentence(self) -> str:
         """Which model is closest, which cannot be told from it, and whether it is of any use."""
         best, tied = self.models[0], self.tied
+        noise = acceptance.is_noise(best.rms, self.noise)
         left = f"{best.rms:.4g}{self._u} rms, {percent(best.rms / self.output_range, of='the output range')}"
+        left += ", no more than noise" if noise else ""
         if tied:
             names = " and ".join([", ".join([best.name, *(each.name for each in tied[:-1])]), tied[-1].name])
             why = "; ".join(dict.fromkeys(map(self.tie, tied)))
@@ -186,8 +188,8 @@ class Comparison:
             said = [f"{best.name} leaves {left}"]
         if not best.rms < self.line.rms:
             said.append("No model is closer than a straight line")
-        elif acceptance.is_noise(best.rms, self.noise):
-            said.append(f"{'They leave' if tied else 'It leaves'} no more than noise")
+        elif tied and noise:
+            said.append("They leave no more than noise")
         return " ".join(f"{each}." for each in said)
 
     def content(self) -> dict[str, object]:

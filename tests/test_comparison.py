@@ -75,7 +75,7 @@ def test_the_table_of_a_stage_that_creeps(folder: Path, run: Call) -> None:
     rows = [line.split("  ")[0] for line in out.splitlines()]
     assert rows[1:4] == ["straight line", str(models[1]), str(models[0])]
     assert f"{models[1]} is the closest: {creep['rms']:.4g} um rms" in out
-    assert "It leaves no more than noise." in out
+    assert " % of the output range, no more than noise; " in out
     page = html.unescape(files[1].read_text())
     assert page.count("<svg") + page.count("image/svg+xml") >= 2
     assert found["sentence"] in page
