@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from hystgen.plays import density as density
     from hystgen.plays import elastoplastic as elastoplastic
     from hystgen.plays import operators as operators
+    from hystgen.report.comparison import compare as compare
     from hystgen.report.diagnosis import diagnose as diagnose
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
@@ -63,6 +64,7 @@ _NAMES = {
     "front.tanh.model": ("TanhEnvelope",),
     "model": ("InverseModel", "Model", "load"),
     "parameters.schema": ("schema",),
+    "report.comparison": ("compare",),
     "report.diagnosis": ("diagnose",),
     "report.identification": ("identify", "report_fit"),
     "report.plan": ("plan",),

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from hystgen.compensator.converter import CodeConversion
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
+    from hystgen.records.frames import Given
+    from hystgen.records.memory import Frame
 
 
 MOST_A_CODE = 0.01
@@ -67,6 +69,9 @@ def cascade_of(parameters: Parameters) -> Cascade:
     pi = PI(part.pi.thresholds, part.pi.weights, part.pi.initial_state)
     return Cascade(pi, tuple(stages), part.output_offset, parameters.input_range)
 
+
+Signal: TypeAlias = "ArrayLike | Frame | Mapping[str, ArrayLike]"
+"""Samples (N,), a series, or a data frame or mapping with a column of samples."""
 
 Answers: TypeAlias = tuple[NDArray[Any], list[str]]
 """Output samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
@@ -320,10 +325,13 @@ class Model:
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
-        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
+        self, v: Signal, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
         t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
+
+        `v` may be a series of pandas, polars or xarray, and the output is then one with the same index; or a data frame
+        or mapping with the column `v` and, for effects, `t` and others, found and converted as in a record.
 
         Without `arithmetic` the model is computed in double precision, and the drive is limited only with `clamp`. With
         'float32', 'float64', 'q31' or 'q15' the result is the bit-exact reference for the emitted C, which limits the
@@ -337,9 +345,21 @@ class Model:
         Warns (`SampleWarning`) with the number of drives outside `input_range` and of non-finite ones, for which the
         last drive is held.
         """
-        y, said = self.answers(v, arithmetic, clamp, engine, t=t, extra=extra)
+        given = self.given("v", v, arithmetic, t, extra)
+        y, said = self.answers(given.samples, arithmetic, clamp, engine, t=given.t, extra=given.extra)
+        given.tell()
         remarks.tell(said)
-        return y
+        return given.answer(y)
+
+    def given(
+        self, column: str, source: Signal, arithmetic: str | None, t: ArrayLike | None,
+        extra: Mapping[str, ArrayLike] | None,
+    ) -> Given:
+        """The signal `column`, "v" or "u", of a call of `simulate`, from an array, a series or a frame."""
+        from hystgen.records import frames
+
+        units = None if arithmetic in FIXED else self.parameters.units
+        return frames.given(column, "y" if column == "v" else "v", source, t, extra, units)
 
     def answers(
         self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None, *,
@@ -496,10 +516,10 @@ class InverseModel:
         return f"<InverseModel of {self.forward!r}>"
 
     def simulate(
-        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
+        self, u: Signal, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,
         t: ArrayLike | None = None, extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
-        """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
+        """Drive (N,) for the reference samples `u` (N,); arguments, and series and frames, as for `Model.simulate`.
 
         As in the C, the drive stays in `input_range` and the memory follows the limited drive, so the inverse is exact
         again at the next reachable reference; `clamp=False` gives the unlimited inverse, in double precision. A
@@ -512,9 +532,11 @@ class InverseModel:
         mode is a sixth of the fourth difference of its reference, and the error in a lag is a quarter of the second
         difference of the drive behind it; everything else is exact.
         """
-        v, said = self.answers(u, arithmetic, clamp, engine, t=t, extra=extra)
+        given = self.forward.given("u", u, arithmetic, t, extra)
+        v, said = self.answers(given.samples, arithmetic, clamp, engine, t=given.t, extra=given.extra)
+        given.tell()
         remarks.tell(said)
-        return v
+        return given.answer(v)
 
     def answers(
         self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = True, engine: str | None = None, *,

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import display
+from hystgen.basics.problems import counted
 from hystgen.compensator.chain.layout import LEAST_LATE
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
@@ -56,7 +58,7 @@ class Tracked:
         return 100.0 * float(np.max(np.abs(self.errors[which][self.known :]))) / self.span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tracking:
     """Tracking errors of the recorded actuator with each compensator, record by record.
 
@@ -78,6 +80,18 @@ class Tracking:
             PLAYS: without if names else "the inverse of the model, which has no effects",
             WHOLE: "the inverse of the model",
         }
+
+    def __repr__(self) -> str:
+        return f"<Tracking of {counted(len(self.records), 'record')}>"
+
+    def _repr_html_(self) -> str:
+        head = ("record", "compensator", "rms %", "max %")
+        rows = [
+            (each.name, which, f"{each.rms(which):.3f}", f"{each.most(which):.3f}")
+            for each in self.records for which in each.errors
+        ]
+        said = "\n".join(f"{which}: {what}." for which, what in self.compensators.items())
+        return display.block(f"{self!r}: % of the motion's span, about the mean", said, rows=[head, *rows])
 
     def table(self) -> str:
         """The table that the command prints."""

@@ -121,7 +121,7 @@ class Made:
         )
         self.structure = SimpleNamespace(
             bounds=(np.full(2, -1.0), np.full(2, 1.0)),
-            parts=(SimpleNamespace(candidate=amount, ordinary=amount),),
+            parts=(SimpleNamespace(candidate=amount, ordinary=amount, known=False),),
             front=None,
             pieces=lambda shape: (np.empty(0), [shape]),
         )

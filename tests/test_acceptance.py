@@ -153,7 +153,7 @@ def found(name: str) -> Any:
 
 def without_fits(monkeypatch: pytest.MonkeyPatch, now: Hypothesis) -> Any:
     """Replace every fit by one that ends at this hypothesis."""
-    for each in ("without_effect", "_without_refit"):
+    for each in ("without_effect", "without_refit"):
         monkeypatch.setattr(selection, each, lambda now, name, _: Hypothesis(now.world, now.names - {name}))
     monkeypatch.setattr(selection.fits, "begun", lambda *_: SimpleNamespace(found=lambda _: now))
     monkeypatch.setattr(selection.fits, "fit", lambda *_: now)

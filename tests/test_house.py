@@ -31,8 +31,8 @@ ROOMS = (
     "cascade",
     "plants",
     "portrait",
-    "model",
     "records",
+    "model",
     "simulation",
     "emission",
     "verification",
@@ -42,6 +42,7 @@ ROOMS = (
     "tracking",
     "fleet",
     "diagnosis",
+    "comparison",
     "planning",
     "report",
     "cli",
@@ -195,7 +196,9 @@ def test_dir_and_help_list_the_public_names() -> None:
         assert name in page
 
 
-@pytest.mark.parametrize("name", ["emit", "verify", "build", "fmu", "identify", "diagnose", "plan", "differences"])
+@pytest.mark.parametrize(
+    "name", ["emit", "verify", "build", "fmu", "identify", "diagnose", "compare", "plan", "differences"]
+)
 def test_signatures_are_real(name: str) -> None:
     """Every option is in the signature with its default, and none is hidden in `**options`."""
     parameters = inspect.signature(getattr(hystgen, name)).parameters.values()

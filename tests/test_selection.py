@@ -244,7 +244,7 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
         return Hypothesis(world, now.names - {name})
 
     monkeypatch.setattr(selection, "without_effect", without)
-    monkeypatch.setattr(selection, "_without_refit", without)
+    monkeypatch.setattr(selection, "without_refit", without)
     now: Any = Hypothesis(world, frozenset("wc"))
     gap = world.gap(Hypothesis(world, frozenset()))
     found = [

@@ -215,6 +215,7 @@ def test_without_extras_models_are_emitted_verified_shown_and_run(python: Path, 
     ["identify", "--batch", "plain.csv", "-o", "made"],
     ["diagnose", "plain.yaml", "plain.csv", "-o", "made"],
     ["track", "plain.yaml", "plain.csv"],
+    ["compare", "plain.yaml", "--holdout", "plain.csv"],
 ])  # fmt: skip
 def test_what_needs_an_extra_names_it_and_leaves_nothing(command: list[str], python: Path, tmp_path: Path) -> None:
     (tmp_path / "plain.yaml").write_text(FILES["plain"])

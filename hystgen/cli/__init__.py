@@ -12,7 +12,9 @@ import click
 from hystgen.basics import console
 from hystgen.basics.version import __version__
 
-COMMANDS = ("emit", "verify", "build", "fmu", "simulate", "identify", "diagnose", "track", "show", "schema")
+COMMANDS = (
+    "emit", "verify", "build", "fmu", "simulate", "identify", "diagnose", "track", "compare", "show", "schema",
+)
 """The commands, each in a module of the same name."""
 
 

@@ -38,6 +38,10 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
     common.guarded(params, run)
 
 
+def _names(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[str, ...]:
+    return () if value is None else tuple(word.strip() for word in value.split(","))
+
+
 @click.command(cls=common.Judging, short_help="Name the effects that a model is missing.")
 @common.params_argument
 @common.data_argument(required=False)
@@ -59,18 +63,24 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @click.option(
     "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of the whole session"
 )
+@click.option(
+    "--with", "known", metavar="creep,lag", callback=_names,
+    help="effects known to be there: fitted and written in any case, and judged all the same",
+)
 @common.effects_option
 @common.record_options
 @common.skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
     plan: bool, max_rate: float | None, rate: float | None, dac_bits: int | None, dac_range: str | None,
-    dac_coding: str | None, session: str | None, history: str | None, rest: float, skip: float,
+    dac_coding: str | None, session: str | None, known: tuple[str, ...], history: str | None, rest: float, skip: float,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effects, and the model with them.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
+
+    Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --with creep,lag -o diagnosis/
 
     Example: hystgen diagnose --plan stage_x.yaml --max-rate 5000 -o plan/
 
@@ -87,7 +97,7 @@ def diagnose(
     if plan:
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
-            "--session": session, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
+            "--session": session, "--with": known, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
         }
         given = [option for option, value in unused.items() if value]
         if given:
@@ -126,7 +136,7 @@ def diagnose(
     common.keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
     common.guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = common.history_values(history)
-    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip}
+    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip, "known": known}
     read_as = common.reading_options(**reading)
 
     def run() -> None:

@@ -20,10 +20,13 @@ from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory, WildInverse
 from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, FitErrors, Inverse, Signals
 from hystgen.diagnosis.search import acceptance, fits, forgetting, harm, hypothesis, selection
+from hystgen.diagnosis.search import known as known_effects
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
+from hystgen.diagnosis.search.known import Known
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
+from hystgen.effects import CATALOGUE, FRONTS
 from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, auto, quality, stage_content
 from hystgen.identification.fit import visited
@@ -54,6 +57,7 @@ def diagnose(
     rest: float = 0.0,
     skip: float = 0.0,
     effects: Sequence[type[Effect]] = (),
+    known: Sequence[str] = (),
     columns: dict[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
@@ -66,7 +70,9 @@ def diagnose(
     judged; if none are given, or too few of their samples can be compared, every third record or the end of each is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
     `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
-    although their drive still moves the plays. `effects`: further effects to try.
+    although their drive still moves the plays. `effects`: further effects to try; `known`: names of effects known to be
+    there, which are fitted before the search and written whatever the records say, each with the judgement that the
+    search would have passed on it.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
     weights so as to minimise the free-run error, and accepted if it removes a substantial part of the held-out error
@@ -91,6 +97,9 @@ def diagnose(
     arguments.number("skip", skip, "seconds", 0.0)
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects must be classes, as hystgen.effects.load_user_effects returns them")
+    named = arguments.words("known", known, CATALOGUE[0])
+    there = [*(effect.name for effect in model.effects), *(FRONTS[:1] if model.cascade.stages else ())]
+    known_effects.check(named, effects, there)
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     read = in_units(read, model.parameters.units, sources=[*fitted, *others])
     nominal = _with_units(model.parameters, read)
@@ -105,15 +114,22 @@ def diagnose(
             for group in (usable[: len(fitted)], usable[len(fitted) :])
         )
         task = _Case(
-            model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, lambda: bar.tick(1)
+            model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, named,
+            lambda: bar.tick(1),
         )
         done, wrong = task.with_history(before, unit)
-        found = selection.no_worse_than(first, done.found, done.records)
-        ready = done.cleaned.clean
-        found, wild = _harmless(found, done, lambda each: _extended(nominal, model.cascade, each, ready, effects))
-        found, by_itself = _no_worse_than_identified(found, done.records, unit)
+        ready, by_itself = done.cleaned.clean, list[str]()
+        write = partial(_extended, nominal, model.cascade, ready=ready, user=effects)
+        found = done.found if named else selection.no_worse_than(first, done.found, done.records)
+        found, wild = _harmless(found, done, write)
+        if named:
+            found = known_effects.complete(found, done.records)
+        else:
+            found, by_itself = _no_worse_than_identified(found, done.records, unit)
         found, made = selection.invertible(found, done.records, P0_FLOOR)
-        extended = _extended(nominal, model.cascade, found, ready, effects)
+        if done.known is not None:
+            found = known_effects.judged(found, done.known, done.records, _refused(found, done, write))
+        extended = write(found)
         result = result_of(
             unit,
             ready,
@@ -141,7 +157,7 @@ NO_FRONT = "the memoryless part of the model was left out: held-out records are 
 
 @dataclass(frozen=True)
 class _Done:
-    """A finished search, with its records and notes about it."""
+    """A finished search, with its records and notes about it; `known`: the effects that the user named, if any."""
 
     cleaned: Cleaned
     noise: NoiseFloor
@@ -149,6 +165,7 @@ class _Done:
     found: Outcome
     forgets: NotAPlaySum | None = None
     notes: tuple[str, ...] = ()
+    known: Known | None = None
 
     def noting(self, note: str) -> _Done:
         """A copy with one more note."""
@@ -166,6 +183,7 @@ class _Case:
     rest: float
     skip: float
     user: Sequence[type[Effect]]
+    named: Sequence[str]
     tick: Callable[[], None]
 
     def with_history(self, history: History, unit: str | None) -> tuple[_Done, OtherHistory | None]:
@@ -241,19 +259,24 @@ class _Case:
         cleaned = disturbances.taken_out(Cleaned(ready, ready), refitted, refit)
         if cleaned.lines:
             refitted = refit(cleaned.clean)
-        noise, records = self._records(cleaned.clean, refitted)
-        found = selection.select(records, refitted, cleaned.left_by)
+        noise, records, known = self._records(cleaned.clean, refitted)
+        found = selection.select(records, known.fitted, cleaned.left_by)
         if found.found and cleaned.left_by(found.fitted):  # a line that shows only once the effects are fitted
             cleaned = disturbances.taken_out(cleaned, found.fitted, partial(selection.again, found.fitted))
             refitted = refit(cleaned.clean)
-            noise, records = self._records(cleaned.clean, refitted)
-            found = selection.select(records, refitted)
+            noise, records, known = self._records(cleaned.clean, refitted)
+            found = selection.select(records, known.fitted)
         forgets = forgetting.forgets(found, records)
-        return _Done(cleaned, noise, records, forgetting.withheld(found, forgets, records), forgets)
+        found = forgetting.withheld(found, forgets, records)
+        return _Done(cleaned, noise, records, found, forgets, known=known if self.named else None)
 
-    def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
+    def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records, Known]:
+        """The noise, the records as a search takes them, and the refitted model with the effects that the user named,
+        from which the search goes on."""
         noise = noise_floor([*clean.to_fit, *clean.held])
-        return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, self.user, self.tick)
+        records = Records.of(clean.to_fit, clean.held, refitted, noise.rms, self.user, self.tick)
+        known = known_effects.added(refitted, self.named, records)
+        return noise, replace(records, gap=rms(known.fitted.errors(records.to_fit))), known
 
 
 def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
@@ -285,21 +308,37 @@ def _harmless(
     found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
 ) -> tuple[Outcome, list[WildInverse]]:
     """The outcome, without effects whose inverse does more than the records support, and the finding about them."""
-    from hystgen.model import Model
-
     if not found.found:
         return found, []
-    records = done.records
     plain = Outcome(found.refitted, found.refitted, (), found.rankings)
+    wild, why = _wild(found, plain, done, written)
+    if wild is None:
+        return found, []
+    names = tuple(dict.fromkeys(each.name for each in found.found))
+    return replace(plain, rankings=selection.refused(found.rankings, why)), [WildInverse(names, **vars(wild))]
+
+
+def _wild(
+    found: Outcome, plain: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
+) -> tuple[harm.Wild | None, Refusal]:
+    """What the inverse of an outcome with effects does beyond what the records support, and the refusal for that."""
+    from hystgen.model import Model
+
+    records = done.records
     with_effects, without = (selection.invertible(each, records, P0_FLOOR)[0] for each in (found, plain))
     gain = acceptance.apart(records.residual(without.fitted), records.residual(with_effects.fitted))
     extended, shorter = (Model(written(each)) for each in (with_effects, without))
     wild = harm.wild(extended, shorter, records.held, gain, done.noise.rms)
-    if wild is None:
-        return found, []
-    names = tuple(dict.fromkeys(each.name for each in found.found))
-    why = Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * max(wild.gain, done.noise.rms))
-    return replace(plain, rankings=selection.refused(found.rankings, why)), [WildInverse(names, **vars(wild))]
+    moves = 0.0 if wild is None else wild.moves
+    return wild, Refusal("wild", moves, acceptance.BEYOND_GAIN * max(gain, done.noise.rms))
+
+
+def _refused(found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]) -> Refusal | None:
+    """The refusal of known effects because of their inverse, or None."""
+    assert done.known is not None
+    plain = Outcome(done.known.plain, done.known.plain, (), ())
+    wild, why = _wild(found, plain, done, written)
+    return None if wild is None else why
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:

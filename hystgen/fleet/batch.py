@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from hystgen import identification
-from hystgen.basics import arguments, extras, writing
+from hystgen.basics import arguments, display, extras, writing
 from hystgen.basics.problems import counted
 from hystgen.basics.progress import Progress
 from hystgen.basics.version import __version__
@@ -73,6 +73,11 @@ class Fleet:
 
     units: tuple[Unit, ...]
     judged: bool
+
+    def _repr_html_(self) -> str:
+        head, *rows = csv.reader(io.StringIO(self.summary()))
+        line = f"{counted(len(self.units), 'unit')}, {len(self.failed)} failed"
+        return display.block(line, rows=[row[:-1] for row in (head, *rows)])  # without the hash
 
     @property
     def failed(self) -> tuple[Unit, ...]:

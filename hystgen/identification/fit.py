@@ -57,7 +57,8 @@ class Fit:
         return f"<Fit {self.parameters.name}: {plays}, {row.part} rms {row.rms:.4g}{unit} ({row.rms_percent:.3g} %)>"
 
     def _repr_html_(self) -> str:
-        return display.block(repr(self), self.table(), None if self.draw is None else partial(self.draw, self))
+        draw = None if self.draw is None else partial(self.draw, self)
+        return display.block(repr(self), "\n".join(self.remarks), draw, quality.cells(self.rows, self.unit))
 
     @property
     def model(self) -> Model:

@@ -11,16 +11,20 @@ import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics import arguments
+from hystgen.basics import arguments, foreign
 from hystgen.basics.problems import RecordError
 from hystgen.records.columns import STANDARD, Column
 from hystgen.records.reading import Reading, Table, one_dimension, repaired
 from hystgen.records.record import Record
+from hystgen.records.units import converted, wanted
+
+if TYPE_CHECKING:
+    from hystgen.parameters.schema import Units
 
 
 class Frame(Protocol):
@@ -44,6 +48,7 @@ _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
 
 def in_memory(source: object) -> TypeGuard[Columns]:
     """Whether something holds the samples of one record, judged by its type alone."""
+    foreign.refuse("a record", source)
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
     # A list may contain paths or records, so only tuples hold arrays
@@ -78,6 +83,28 @@ def read(
         return repaired(reading, _table(reading, _named(source, name, sample_time)))
     except RecordError as error:
         raise RecordError(map(_as_call, error.problems)) from None
+
+
+def whole(source: Columns, column: str, units: Units | None) -> Record:
+    """Every sample of a frame, NaN where a value is missing, as a record for a model that answers to `column`.
+
+    `units`: those to which it is converted, None for codes, which have no unit. Raises RecordError, ValueError and
+    TypeError as `read` does; the record has no time (`timed`) if the frame has none.
+    """
+    reading = Reading("the frame", {}, None, None, (column,), lambda _: None, points=True)
+    try:
+        table = _table(reading, _named(source, "the frame", None))
+    except RecordError as error:
+        raise RecordError(map(_as_call, error.problems)) from None
+    numbers, timed = dict(table.numbers), "t" in table.numbers
+    t = numbers.pop("t", np.arange(len(numbers[column]), dtype=np.float64))
+    if units is None and (unit := table.units.get(column)):
+        raise ValueError(f"column {column} is in {unit}, but fixed point takes codes; pass codes, without a unit")
+    v = numbers.pop("v", np.empty(0))
+    record = Record("the frame", t, v, numbers.pop("y", None), numbers, units=table.units, timed=timed)
+    if units is None:
+        return record
+    return converted([record], wanted(units, ("", {}), ("units", {})), (column,), (), "")[0]
 
 
 def _as_call(problem: str) -> str:
@@ -130,8 +157,8 @@ def _table(reading: Reading, named: Mapping[str, object]) -> Table:
     columns: list[Column] = []
     ignored: list[str] = []
     for name, values in named.items():
-        numbers, timed = _numbers(values)
-        length = 0 if numbers is None else one_dimension(numbers.shape)
+        numbers, timed = timed_numbers(values)
+        length = 0 if numbers is None else numbers.size if numbers.ndim == 1 else one_dimension(numbers.shape)
         if numbers is not None and length:
             unit = "s" if timed else ""
             columns.append(Column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
@@ -140,11 +167,21 @@ def _table(reading: Reading, named: Mapping[str, object]) -> Table:
     return reading.table(columns, ignored)
 
 
-def _numbers(values: object) -> tuple[NDArray[np.generic] | None, bool]:
-    """An array of real numbers, NaN where masked, with times as seconds from the first; None for anything else; and
-    whether the numbers are times."""
+def _kind(values: object) -> str:
+    """The kind of an array's or a series' values as numpy names it; zoned stamps, too, are M."""
+    kind = getattr(getattr(values, "dtype", None), "kind", None)
+    return kind if isinstance(kind, str) else np.asarray(values).dtype.kind
+
+
+def numbers_of(values: object) -> NDArray[np.generic] | None:
+    """An array of real numbers, NaN where masked, with times as seconds from the first; None for anything else."""
+    return timed_numbers(values)[0]
+
+
+def timed_numbers(values: object) -> tuple[NDArray[np.generic] | None, bool]:
+    """`numbers_of`, and whether the numbers are times."""
     try:
-        found = np.asarray(values)
+        found = np.asarray(values, dtype="datetime64[ns]" if _kind(values) == "M" else None)  # a zoned stamp in UTC
     except ValueError:  # lists of different lengths
         return None, False
     if isinstance(values, np.ma.MaskedArray) and found.dtype.kind in "fiub":

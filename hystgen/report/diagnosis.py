@@ -151,13 +151,15 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
     if not result.effects:
         return [Text("No effect in the catalogue removes enough of the held-out error to be named.")]
     unit = result.unit
-    rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p"]]
+    rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p", "named by"]]
     means = [["effect", "compensation", "how"]]
     numbers = [["effect", "parameter", "value", "95 % from", "to", "what it is"]]
     for effect in result.effects:
         before, after = effect.holdout_before, effect.holdout_after
-        share = f"{100.0 * effect.share_of_gap:.0f} %"
-        rows.append([effect.name, f"{before:.4g}", f"{after:.4g}", share, _chance(effect.p_value)])
+        share = f"{round(100.0 * effect.share_of_gap)} %"
+        named_by = "the search" if not effect.known else "you; the records support it" if effect.unsupported is None \
+            else f"you; the records do not support it: {effect.unsupported}"
+        rows.append([effect.name, f"{before:.4g}", f"{after:.4g}", share, _chance(effect.p_value), named_by])
         kind = _kind(effect, there)
         how = (kind.compensated, kind.compensation) if kind is not None else FRONT
         means.append([effect.name, *how])
@@ -166,7 +168,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
             several = _numbers(value, effect.intervals.get(key), key.replace("_", " "))
             numbers += [[effect.name, *row, said.get(key, "")] for row in several]
     return [
-        HtmlTable(rows, (0,)),
+        HtmlTable(rows, (0, 5)),
         Text("What they mean for a compensator:"),
         HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted

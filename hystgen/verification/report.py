@@ -124,7 +124,7 @@ class Report:
         return f"<Report {self.name}: {self.arithmetic}, {self.engine}, {self.layout}; {found}>"
 
     def _repr_html_(self) -> str:
-        return display.block(repr(self), self.table())
+        return display.block(repr(self), self._below(), rows=self._cells())
 
     @property
     def ok(self) -> bool:
@@ -138,17 +138,24 @@ class Report:
 
     def table(self) -> str:
         """A table for people; columns without a figure in any row are left out."""
+        texts = []
+        for words in zip(*self._cells(), strict=True):
+            width = max(map(len, words))
+            texts.append([word.rjust(width) if words[0] in _RIGHT else word.ljust(width) for word in words])
+        lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
+        return "\n".join(lines) + self._below()
+
+    def _cells(self) -> list[tuple[str, ...]]:
+        """The header and the rows of the table."""
         measured = [(name, cell) for name, cell in _WHERE_MEASURED if any(cell(row) != "-" for row in self.rows)]
         columns = [*_ALWAYS, *measured, ("result", lambda row: row.verdict)]
-        texts = []
-        for name, cell in columns:
-            words = [name, *(cell(row) for row in self.rows)]
-            width = max(map(len, words))
-            texts.append([word.rjust(width) if name in _RIGHT else word.ljust(width) for word in words])
-        lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
-        notes = [f"\n{row.target}: {row.note}" for row in self.rows if row.note]
-        details = [f"\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
-        return "\n".join(lines + notes + details)
+        return [tuple(name for name, _ in columns), *(tuple(cell(row) for _, cell in columns) for row in self.rows)]
+
+    def _below(self) -> str:
+        """Notes and details below the table."""
+        notes = [f"\n\n{row.target}: {row.note}" for row in self.rows if row.note]
+        details = [f"\n\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
+        return "".join(notes + details)
 
     def content(self) -> dict[str, object]:
         """The report as plain data for JSON."""

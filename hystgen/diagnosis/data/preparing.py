@@ -305,16 +305,7 @@ def prepare(
         if courses and not any(course.used > acceptance.COMPARED_SAMPLES for course in courses):
             raise IdentificationError(too_little(courses, what))
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
-        for channel, wrong, what in (
-            ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
-            ("y", _outliers(course), faults.NOT_COMPARED),
-        ):
-            if len(wrong):
-                notes.append(faults.sentence(course.name, wrong, what))
-                repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
-        edges = np.count_nonzero(unresolved_edges(course.v)[course.first :])
-        if edges:
-            notes.append(f"{course.name}: {counted(int(edges), 'sample')} not compared, at jumps of the drive")
+        _tell_left_out(course, record, notes, repaired)
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
@@ -333,6 +324,45 @@ def prepare(
     places = np.array(pi.dense(reach, samples, acceptance.PLAYS).thresholds)
     notes.extend(hardly_compared([*to_fit, *held]))
     return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
+
+
+def to_judge(
+    records: Sequence[Record], history: tuple[float, ...] | None, rest: float, skip: float = 0.0
+) -> tuple[list[Item], list[str]]:
+    """Items for judging models without a fit, prepared as `prepare` does, and notes on what is not compared.
+
+    Raises IdentificationError if too few samples can be compared.
+    """
+    notes: list[str] = []
+    courses, rails = _courses(records, history, skip)
+    if not enough(courses):
+        raise IdentificationError(too_little(courses, JUDGE))
+    repaired: list[Finding] = [*rails]
+    prepared.mask_outliers(courses, [], None, 0.0)
+    courses, _, way = _begun(courses, [])
+    notes += way
+    for course, record in zip(courses, records, strict=True):
+        _tell_left_out(course, record, notes, repaired)
+    items, _ = _in_session([_item(c, r, rest) for c, r in zip(courses, records, strict=True)], [])
+    sound, wrong = without_faults(items, not_at_the_end(repaired, items))
+    if any(item.known.any() for item in sound):
+        items = sound
+        notes += [each.sentence(None) for each in merged(wrong)]
+    return items, [*notes, *hardly_compared(items)]
+
+
+def _tell_left_out(course: Course, record: Record, notes: list[str], repaired: list[Finding]) -> None:
+    """Add notes on the samples that are bridged or not compared, and findings about isolated ones."""
+    for channel, wrong, what in (
+        ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
+        ("y", _outliers(course), faults.NOT_COMPARED),
+    ):
+        if len(wrong):
+            notes.append(faults.sentence(course.name, wrong, what))
+            repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
+    edges = np.count_nonzero(unresolved_edges(course.v)[course.first :])
+    if edges:
+        notes.append(f"{course.name}: {counted(int(edges), 'sample')} not compared, at jumps of the drive")
 
 
 def _courses(

@@ -65,12 +65,15 @@ def result_of(
     rivals = found.not_separable
     structured = any(isinstance(each, Structured) for each in remaining)
     result = Result(
-        verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",
+        verdict=(
+            "effects_found" if any(each.refused is None for each in found.found)
+            else "unexplained" if remaining else "nothing_missing"
+        ),
         noise_floor=noise.rms,
         output_range=max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         unit=unit,
         gap=gap,
-        effects=_effects(found, ready.to_fit, gap.refitted.holdout, noise.rms),
+        effects=_effects(found, ready.to_fit, gap.refitted.holdout, noise.rms, unit),
         unexplained=(*remaining, *(each for each in odd if each not in remaining), *ready.repaired),
         where=worst(everything, [*before[0], *before[1]], noise.rms),
         not_separable=rivals,
@@ -178,7 +181,9 @@ def _unexplained(
     return remaining
 
 
-def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float, noise: float) -> tuple[NamedEffect, ...]:
+def _effects(
+    found: Outcome, to_fit: Sequence[Item], refitted: float, noise: float, unit: str | None
+) -> tuple[NamedEffect, ...]:
     if not found.found:
         return ()
     sure = fits.intervals(found.fitted, to_fit)
@@ -200,6 +205,8 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float, noise: flo
                 _evidence(each, refitted, noise),
                 bool(ends) or _twice(parameters.get("time_constants", ())),
                 ends,
+                each.known,
+                None if each.refused is None else reason(each.refused, unit),
             )
         )
     return tuple(effects)
@@ -217,7 +224,8 @@ def _advice(one: str, other: str) -> str:
 
 def _evidence(each: Found, refitted: float, noise: float) -> str:
     gain = 100.0 * (1.0 - each.after / each.before) if each.before else 0.0
-    said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
+    change = f"{gain:.0f} % less" if gain >= 0.0 else f"{-gain:.0f} % more"
+    said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({change})"
     if is_noise(each.after, noise) or not refitted:
         return said
     return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap remain"

@@ -119,7 +119,8 @@ class NamedEffect:
 
     `share_of_gap`: the held-out error that the effect removes, as a fraction of the refitted model's error; errors in
     output units; `at_an_end`: whether a parameter is at an end of its range or two parts of the effect coincide, so
-    that its shape is not certain; `ends`: the parameters at an end.
+    that its shape is not certain; `ends`: the parameters at an end; `known`: whether the user named it; `unsupported`:
+    why the records alone would not have named it, None if they do.
     """
 
     name: str
@@ -132,6 +133,8 @@ class NamedEffect:
     evidence: str
     at_an_end: bool = False
     ends: tuple[AtEnd, ...] = ()
+    known: bool = False
+    unsupported: str | None = None
 
 
 @dataclass(frozen=True)
@@ -223,12 +226,24 @@ class Diagnosis:
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
 
     def __repr__(self) -> str:
-        effects = ", ".join(effect.name for effect in self.result.effects)
+        effects = ", ".join(effect.name for effect in self.result.effects if effect.unsupported is None)
         return f"<Diagnosis {self.parameters.name}: {self.verdict}{': ' if effects else ''}{effects}>"
 
     def _repr_html_(self) -> str:
         first = next(iter(self.figures.values()), None)
-        return display.block(repr(self), self.sentence(), None if first is None else partial(first, self))
+        draw = None if first is None else partial(first, self)
+        return display.block(repr(self), self.sentence(), draw, self.rows())
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """A table of the effects: a header, then the held-out error with each; empty without effects."""
+        unit = f" [{self.result.unit}]" if self.result.unit else ""
+        head = ("effect", f"held-out rms before{unit}", f"after{unit}", "share of the gap", "p", "supported")
+        found = []
+        for each in self.result.effects:
+            errors = f"{each.holdout_before:.4g}", f"{each.holdout_after:.4g}", f"{round(100.0 * each.share_of_gap)} %"
+            supported = "yes" if each.unsupported is None else "no"
+            found.append((each.name, *errors, f"{each.p_value:.1g}", supported))
+        return [head, *found] if found else []
 
     @property
     def model(self) -> Model:
@@ -266,7 +281,7 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
         parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
-        parts += [*self._limits(), self._finding()]
+        parts += [*self._limits(), *self._known(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
             parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
         wrong = kinds.faults(self.result.unexplained)
@@ -298,6 +313,27 @@ class Diagnosis:
             said.append(f"An error of {self._rms(left)} rms is not explained, {self._times(left)}")
         return said
 
+    def _known(self) -> list[str]:
+        """The judgement on each effect that the user named."""
+        said = []
+        for each in self.result.effects:
+            if not each.known:
+                continue
+            gain = f"from {self._rms(each.holdout_before)} to {self._rms(each.holdout_after)}, p = {each.p_value:.1g}"
+            if each.unsupported is None:
+                said.append(f"You named {each.name}, and the records support it: held-out rms error {gain}")
+            else:
+                why = f"{each.unsupported} (held-out rms error {gain})"
+                said.append(f"You named {each.name}, so it is written, but the records do not support it: {why}")
+        return said
+
+    @property
+    def _harmful(self) -> str:
+        """The effects that the user named and that raise the held-out error; empty if none does."""
+        raise_it = 1.0 + acceptance.BETTER
+        found = [each for each in self.result.effects if each.unsupported is not None]
+        return " and ".join(each.name for each in found if each.holdout_after > raise_it * each.holdout_before)
+
     def _finding(self) -> str:
         """The verdict itself."""
         result = self.result
@@ -305,15 +341,15 @@ class Diagnosis:
         before, after = self._rms(gap.refitted.holdout), self._rms(gap.after.holdout)
         structured = any(isinstance(each, Structured) for each in seen)
         if self.verdict == "effects_found":
-            names = ", ".join(self._name(effect.name) for effect in result.effects)
+            names = ", ".join(self._name(each.name) for each in result.effects if each.unsupported is None)
             more = f", {self._times(gap.after.holdout)} and with structure" if structured else ""
             if gap.after.holdout > acceptance.MUCH_LEFT * result.noise_floor:
                 by = f"{100.0 * (1.0 - gap.after.holdout / gap.refitted.holdout):.0f} %"
                 return f"Missing, in part: {names}. The held-out rms error falls by {by}, from {before} to {after}"
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
-            whose = WRITTEN[result.written]
-            return f"Nothing is missing: the held-out rms error of {whose} is {after}, which is noise"
+            whose, more = WRITTEN[result.written], " else" if result.effects else ""
+            return f"Nothing{more} is missing: the held-out rms error of {whose} is {after}, which is noise"
         where, left = "", gap.after.holdout
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " on the fitted records", gap.after.fit
@@ -332,6 +368,8 @@ class Diagnosis:
         """The beginning of a verdict that names no effect."""
         if self._of_another_kind():
             return "No effect is named"
+        if self._harmful:
+            return f"Part of the error may come from {self._harmful}, which you named"
         if self._closest() is None:
             return "Something is missing that the catalogue does not contain or the records cannot show"
         return "Something is missing, and no effect is named"
@@ -360,8 +398,8 @@ class Diagnosis:
         return f"{named[0].upper()}{named[1:]} would leave {' and '.join(left)}: {found.why}{ends}"
 
     def _closest(self) -> Contender | None:
-        first = self.result.ranking[0] if self.result.ranking else ()
-        gap = self.result.gap
+        searched = self.result.ranking[sum(each.known for each in self.result.effects) :]
+        first, gap = searched[0] if searched else (), self.result.gap
         enough = (1.0 - acceptance.BETTER) * min(gap.refitted.holdout, gap.after.holdout)
         return min((each for each in first if each.holdout <= enough), key=lambda each: each.holdout, default=None)
 

@@ -339,13 +339,14 @@ class Part:
     """An effect in a hypothesis: its catalogue name and the candidate whose parameters are fitted.
 
     `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, because its
-    author set it or because the effect would be a different one beyond it.
+    author set it or because the effect would be a different one beyond it; `known`: whether the user named it.
     """
 
     name: str
     candidate: Candidate
     usual: Candidate | None = None
     firm: bool = False
+    known: bool = False
 
     @property
     def ordinary(self) -> Candidate:

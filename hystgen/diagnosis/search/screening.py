@@ -85,6 +85,11 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
     )
 
 
+def name_of(kind: type[Effect]) -> str:
+    """The name of a user's own effect."""
+    return str(kind.model_fields["name"].annotation.__args__[0])  # type: ignore[union-attr]
+
+
 def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> list[Option]:
     """Every extension of a hypothesis by one effect."""
     structure, held = now.structure, now.structure.held(now.shape)
@@ -94,7 +99,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     if not held.front.stages(np.empty(0)):
         found += _fronts(structure, held, known.drive)
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
-    kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
+    kinds += [(name_of(kind), kind) for kind in user]
     for name, kind in kinds:
         if (name in there and not kind.repeatable) or not known.columns.issuperset(kind.columns):
             continue
@@ -252,8 +257,11 @@ class Records:
             return [now]
         return [now, fits.on_equal_terms(now, other, self.quick)]
 
-    def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
-        """The hypothesis with one more effect, best shapes first; `worth`: selects the options to try."""
+    def extensions(
+        self, now: Fitted, worth: Callable[[Option], bool] | None = None, whatever: bool = False
+    ) -> list[Tried]:
+        """The hypothesis with one more effect, best shapes first; `worth`: selects the options to try; `whatever`: also
+        those that do not lower the error of the fit."""
         rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
@@ -262,7 +270,7 @@ class Records:
         found = [_Pair(*each) for each in both if worth is None or worth(each[0])]
         searches = _Searches(now, rough, found, self)
         with parallel.Pool(searches, self.jobs) as pool:
-            return _followed_up(searches, _screened(searches, pool), pool)
+            return _followed_up(searches, _screened(searches, pool), pool, whatever)
 
     def restarted(self, fitted: Fitted) -> Fitted:
         """The fit with start memories found in the presence of its effects (`fits.restarted`)."""
@@ -503,8 +511,10 @@ def _twins(one: _Screened, other: _Screened) -> bool:
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 
 
-def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) -> list[Tried]:
-    """The options fitted jointly and judged on held-out records, the best one first."""
+def _followed_up(
+    searches: _Searches, kept: Sequence[_Screened], pool: _Pool, whatever: bool = False
+) -> list[Tried]:
+    """The options fitted jointly and judged on held-out records, the best one first; `whatever`: as in `extensions`."""
     now, records = searches.now, searches.records
     found = {each.k: searches.found[each.k].option for each in kept}
     by_held_out = acceptance.PROMISING * min((each.residual for each in kept), default=0.0)
@@ -538,7 +548,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     done |= all_of([*going_on, *others])
     tried = []
     for k, option in found.items():
-        if done[k].rms >= now.rms:
+        if done[k].rms >= now.rms and not whatever:
             continue
         fitted = done[k].of(option.structure)
         errors = fitted.errors(records.held)

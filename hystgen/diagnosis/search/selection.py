@@ -125,6 +125,12 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
 
 
+def chance(now: Fitted, best: Tried, records: Records) -> float:
+    """p-value of the gain of a tried effect on held-out records, on equal terms."""
+    held, _ = _removed(now, best, records)
+    return difference(held.without, held.errors)
+
+
 @dataclass(frozen=True)
 class _Removed:
     """Errors of some records without an effect and with it, on equal terms."""
@@ -397,7 +403,7 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     held, to_fit = explained(now, none, records)
     if records.one_loop and held.after > acceptance.FAR_ABOVE_NOISE * records.noise:
         return Refusal("above", held.after, acceptance.FAR_ABOVE_NOISE * records.noise)
-    at_an_end = any(fits.part_at_an_end(now, k) for k in range(len(now.structure.parts)))
+    at_an_end = any(fits.part_at_an_end(now, k) for k, part in enumerate(now.structure.parts) if not part.known)
     for each in (held, to_fit):
         far = each.after > acceptance.MUCH_LEFT * records.noise
         if far and at_an_end and each.left > acceptance.END_LEAVES:
@@ -446,7 +452,10 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """An accepted effect, and the held-out rms with and without it."""
+    """An accepted effect, and the held-out rms with and without it.
+
+    `known`: whether the user named it; `refused`: then, why the search would not have named it, or None.
+    """
 
     name: str
     label: str
@@ -454,6 +463,8 @@ class Found:
     after: float
     p_value: float
     rivals: tuple[str, ...]
+    known: bool = False
+    refused: Refusal | None = None
 
 
 @dataclass(frozen=True)
@@ -859,7 +870,7 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
-            start = _without_refit(now, old.name, records)  # a refit could move the others' parameters far
+            start = without_refit(now, old.name, records)  # a refit could move the others' parameters far
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
@@ -1009,7 +1020,7 @@ def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
     return records.restarted(fits.fit(smaller[0], records.quick, smaller[1], now.weights))
 
 
-def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
+def without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
     """The hypothesis without one effect, with the others' parameters unchanged."""
     smaller = _less(now, name)
     if smaller is None:

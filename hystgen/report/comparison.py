@@ -1,0 +1,168 @@
+"""The picture and the page of a comparison of models: the deviations of all of them on one scale."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, ParamSpec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import comparison
+from hystgen.basics import drawing
+from hystgen.basics.drawing import label
+from hystgen.basics.version import __version__
+from hystgen.comparison import LINE, Comparison, Deviation
+from hystgen.report.html import HtmlTable, Listing, Picture, Section, Text, page
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+WIDE, NARROW = 9.0, 4.2
+"""[inches] Widths of the picture on a screen and on a phone."""
+
+SIDE_BY_SIDE = 3
+"""Maximum number of panels beside each other."""
+
+GAP = 0.03
+"""[fraction of the total time] Space between two records in a panel."""
+
+FAR = 25.0
+"""[times the noise] If a deviation is larger, the scale is logarithmic beyond the noise."""
+
+ROOM = 1.08
+"""Height of the common scale, as a multiple of the largest deviation of a model."""
+
+PAGE = "report.html"
+
+P = ParamSpec("P")
+
+
+def _with_page(find: Callable[P, Comparison]) -> Callable[P, Comparison]:
+    @functools.wraps(find)
+    def found(*given: P.args, **named: P.kwargs) -> Comparison:
+        return replace(find(*given, **named), page=html, draw=figure)
+
+    return found
+
+
+compare = _with_page(comparison.compare)
+"""`hystgen.compare`: the comparison, with a page to write and a picture to draw."""
+
+
+def figure(found: Comparison, width: float = WIDE) -> Figure:
+    """The rms deviation of every model beside the noise, and below it every model's deviation over time, on one scale.
+
+    The straight line is in the first part alone. If a deviation is far above the noise, the scale is linear within the
+    noise and logarithmic beyond it, since a small deviation beside a large one would be a flat line.
+    """
+    number = len(found.models)
+    across = 1 if width == NARROW else 2 if number in (2, 4) else min(SIDE_BY_SIDE, number)
+    down = -(-number // across)
+    bars = 0.8 + 0.3 * (number + 1)
+    drawn = drawing.figure(width, bars + 2.3 * down)
+    top, below = drawn.subfigures(2, 1, squeeze=False, height_ratios=(bars, 2.3 * down))[:, 0]
+    _bars(top.subplots(), found, width)
+    panels = below.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+    most = ROOM * max(max(each.most for each in found.models), found.noise)
+    far = most > FAR * found.noise
+    decades = 10.0 ** np.arange(np.ceil(np.log10(2.0 * found.noise)), np.floor(np.log10(most)) + 1.0)
+    for k, axes in enumerate(panels.flat):
+        if k >= number:
+            axes.set_axis_off()
+            continue
+        _over_time(axes, found, found.models[k])
+        if far:
+            axes.set_yscale("symlog", linthresh=found.noise)
+            axes.set_yticks([*(-decades), 0.0, *decades])
+        axes.set_ylim(-most, most)
+        axes.set_title(_short(found.models[k].name, 30), fontsize=9)
+        if k % across == 0:
+            axes.set_ylabel(label("deviation", found.unit))
+        if k + across >= number:
+            axes.set_xlabel("time compared (s), record after record" if len(found.records) > 1 else "time compared (s)")
+            axes.tick_params(labelbottom=True)
+    return drawn
+
+
+def _bars(axes: Axes, found: Comparison, width: float) -> None:
+    """The rms deviation of the straight line and of every model, on a logarithmic axis, and the noise."""
+    every = (found.line, *found.models)
+    closest = {found.models[0].name, *(each.name for each in found.tied)}
+    for k, each in enumerate(every):
+        colour = drawing.RESIDUAL if each.name in closest else drawing.QUIET if each is found.line else drawing.MODEL
+        axes.plot(max(each.rms, 1e-300), k, "o", color=colour, markersize=8)
+        place = max(each.rms, 1e-300), k
+        axes.annotate(f"{each.rms:.3g}", place, (8.0, 0.0), textcoords="offset points", va="center", fontsize=9)
+    axes.axvline(found.noise, color=drawing.FAULT, linestyle="--", linewidth=1.1, label="noise")
+    axes.set_xscale("log")
+    low, high = min(found.noise, *(each.rms for each in every)), max(each.rms for each in every)
+    axes.set_xlim(0.6 * low, high * (high / low) ** (0.15 if width == WIDE else 0.35) * 1.3)
+    axes.set_yticks(range(len(every)), [_short(each.name, 40 if width == WIDE else 18) for each in every])
+    axes.set_ylim(len(every) - 0.5, -0.5)
+    axes.grid(axis="y", visible=False)
+    axes.set_xlabel(label("rms deviation", found.unit))
+    drawing.legend_above(axes, 1)
+
+
+def _over_time(axes: Axes, found: Comparison, model: Deviation) -> None:
+    """A model's deviation over time, the records one after another, with the noise."""
+    start = 0.0
+    gap = GAP * sum(float(np.ptp(record.t)) for record in found.records)
+    for record, error in zip(found.records, model.errors, strict=True):
+        first, last = np.flatnonzero(np.isfinite(error))[[0, -1]].tolist()
+        chosen = drawing.kept(first, last + 1, error)
+        t = record.t - record.t[first] + start
+        axes.plot(t[chosen], error[chosen], color=drawing.RESIDUAL, linewidth=0.8)
+        start = float(t[last]) + gap
+        if record is not found.records[-1]:
+            axes.axvline(start - 0.5 * gap, color=drawing.IGNORED, linewidth=0.8)
+    for side in (found.noise, -found.noise):
+        axes.axhline(side, color=drawing.FAULT, linewidth=0.8, linestyle="--")
+
+
+def _short(name: str, most: int) -> str:
+    """The end of a long name, which tells files apart."""
+    return name if len(name) <= most else f"..{name[2 - most :]}"
+
+
+def html(found: Comparison) -> str:
+    """The page. Raises PlotError without matplotlib."""
+    with drawing.styled():
+        wide, narrow = (drawing.content(figure(found, width), "svg") for width in (WIDE, NARROW))
+    names = ", ".join(record.name for record in found.records)
+    picture = Picture(
+        "deviations", wide, narrow,
+        f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and what cannot be told "
+        "from it. Below: measured minus model over time, on one scale for all models, which is logarithmic beyond the "
+        "noise (dashed, 1 sd) if a deviation is far above it. Samples that are not compared are left out.",
+        "The rms deviation of each model beside the noise, and panels with each model's deviation over time.",
+    )
+    rows = found.rows()
+    noise = f"The noise of the records is {found.noise:.3g}{f' {found.unit}' if found.unit else ''} rms."
+    free = (
+        "Nothing is fitted to these records but the offset of each and, unless the history is given, the state in "
+        f"which it starts. The {LINE} has one slope for all of them, the best."
+    )
+    marked = None if found.tied else rows.index(next(row for row in rows if row[0] == found.models[0].name))
+    sections = [
+        Section("Side by side", [HtmlTable(rows, (0, 1), marked), Text(noise), Text(free)]),
+        Section("Deviations", [picture]),
+        Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
+        Section("Provenance", [Text(f"hystgen {__version__}; the same records and models give the same page.")]),
+    ]
+    return page("Comparison of models", [Text(found.sentence()), *_next_step(found)], sections)
+
+
+def _next_step(found: Comparison) -> list[Text]:
+    """What to do with the closest model."""
+    best = found.models[0]
+    if not best.rms < found.line.rms:
+        return []
+    name = best.name if best.name.endswith((".yaml", ".yml")) else "params.yaml"
+    return [Text("Your next step: write the compensator as C.", f"hystgen emit {name} -o firmware/")]
