@@ -726,6 +726,8 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     only once the next effect is included.
     """
     alike = rivals(latest.best, latest.tried, records)
+    if step.merit is None:  # next to the same error, the same effects fail
+        alike = [each for each in alike if not _same(each.fitted, latest.best.fitted, records)]
     if step.merit is None and any(_hidden(step.now, each, records) for each in step.tried):
         alike += _other_shapes(latest.best, latest.tried, records)
     others = {each.name: each for each in reversed(alike)}  # the best one of each name
@@ -750,6 +752,15 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
     return None if chosen[1] is step else chosen
+
+
+def _same(one: Fitted, other: Fitted, records: Records) -> bool:
+    """Whether the errors of two hypotheses differ by so little that no further effect could tell one from the other."""
+    for items in (records.held, records.to_fit):
+        apart = [a - b for a, b in zip(one.errors(items), other.errors(items), strict=True)]
+        if rms(apart) > acceptance.NEEDLESS * records.noise:
+            return False
+    return True
 
 
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
