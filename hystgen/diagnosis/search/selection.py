@@ -113,6 +113,10 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     if not (at_rest or _enough(held, fitted, needed, records.noise)):
         short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
         return Refusal("little", short.removed, needed * max(records.noise, short.left))
+    if _beside_rates(now, best) and not all(
+        takes_most(each.left, rms(each.without), records.noise) for each in (held, fitted)
+    ):
+        return Refusal("most", held.left, rms(held.without))
     p_value = difference(held.without, held.errors)
     if at_rest:
         return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
@@ -123,6 +127,17 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         if of_fitted > acceptance.P_SURE:
             return Refusal("unsure", of_fitted, acceptance.P_SURE)
     return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
+
+
+def _beside_rates(now: Fitted, best: Tried) -> bool:
+    """Whether an effect is an element next to plays that depend on the rate.
+
+    Friction has more laws of rates than the catalogue: what a rate dependence leaves of another one changes loops, as
+    an element does. Next to it, an element has merit only if it takes most of the error.
+    """
+    return best.option.name == effects.PARALLEL and any(
+        type(effect).moves_plays() for effect in now.structure.effects(now.shape)
+    )
 
 
 @dataclass(frozen=True)
@@ -871,7 +886,11 @@ def _exchanged(
             if fitted is None:
                 continue
             start = _without_refit(now, old.name, records)  # a refit could move the others' parameters far
-            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
+            among = {*names, *_look_alikes(old.name)}
+            step = _step(
+                fitted, 0.0, records, lambda option, among=among: option.name in among, start,  # type: ignore[misc]
+                acceptance.FIRST_REMOVES,
+            )
             if step is None or step.merit is None:
                 continue
             better = _that_replaces(now, old.name, step, records)
@@ -891,6 +910,16 @@ def _exchanged(
         else:
             break
     return now, found
+
+
+def _look_alikes(name: str) -> list[str]:
+    """Effects that make the output lag, if this is one of them; each is searched for in the place of the others.
+
+    Which of them is there may show only once the other effects are known: next to an element of the wrong shape, or
+    without one, a lag can be among the best of no round.
+    """
+    lagging = [each for each in effects.CATALOGUE if effects.shapes(each)[0].rank < math.inf]
+    return lagging if name in lagging else []
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
