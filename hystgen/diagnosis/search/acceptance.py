@@ -141,8 +141,8 @@ MOST_OF_GAP = 0.5
 the effect, and cannot separate several such effects: one curve up and one down hardly show which shape is right. Set
 by: 180 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not
 recorded). Next to plays that depend on the rate, an element has merit only within the same limit: next to thermally
-activated friction, false elements left 0.51 and 0.60; true ones next to a rate dependence named for a lag, 0.41 at
-most. Set by (the latter): blind pair 97023 and 97029. Changed by:
+activated friction, false elements left 0.51 and 0.60; a true one, next to a rate dependence found before the lag that
+it stands for, at most 0.41. Set by (the latter): blind pair 97023 and 97029. Changed by:
 selection::test_next_to_plays_that_depend_on_the_rate_an_element_takes_most."""
 
 LEAST_EXPLAINED = 0.5
