@@ -20,6 +20,7 @@ from hystgen.diagnosis.findings.result import AtEnd
 from hystgen.diagnosis.search import fits, ranges, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
+from hystgen.effects import CATALOGUE
 from hystgen.effects.base import About, Effect, Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.effects.rate_dependence.model import RelaxingPlays
@@ -290,6 +291,45 @@ def test_a_rival_that_is_the_next_effect_is_not_followed_up(second: float) -> No
     assert sorted(extended) == (["c"] if second < 1.0 else ["b", "c"])
 
 
+@pytest.mark.parametrize(("apart", "followed"), [(0.2, []), (0.4, ["b", "c"])])
+def test_a_rival_that_leaves_the_same_errors_is_not_followed_up(apart: float, followed: list[str]) -> None:
+    """After `a` nothing follows, and after `b` follows `c`: that is believed only if the errors of `a` and `b` differ;
+    `apart`: by how many times the noise."""
+    left = {"a": 0.5, "b": 0.5 + apart * NOISE * np.sqrt(2.0), "ac": 0.5, "bc": 0.02}
+    world = World({frozenset(names): share for names, share in left.items()}, "abc")
+    world.colour = lambda *_: np.zeros(2000)  # type: ignore[method-assign]
+    world.left |= {frozenset("ab"): 0.5}
+    now: Any = Hypothesis(world, frozenset())
+    latest = selection._step(now, world.gap(now), world.records)
+    assert latest is not None
+    assert latest.best.name == "a"
+    tried = [world.tried(latest.best.fitted, name) for name in "bc"]  # type: ignore[arg-type]
+    step = selection._Step(latest.best.fitted, tried, latest.best, None)
+    pair = selection._with_rival(latest, step, world.gap(now), world.records)
+    assert [each.best.name for each in pair or ()] == followed
+
+
+@pytest.mark.parametrize(("name", "more"), [
+    ("rate_dependence", {"creep", "resonance", "lag", "delay"}), ("sensor_nonlinearity", set()),
+])  # fmt: skip
+def test_what_lags_is_sought_in_the_place_of_what_lags(
+    name: str, more: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever was among the best of a round: next to an element of the wrong shape, a lag may not have been."""
+    asked: list[Any] = []
+
+    def step(*given: Any) -> None:
+        asked.append(given[3])
+
+    for other in ("without_effect", "_without_refit"):
+        monkeypatch.setattr(selection, other, lambda *_: SimpleNamespace())
+    monkeypatch.setattr(selection, "_step", step)
+    found = [selection.Found(each, "", 1.0, 1.0, 0.0, ()) for each in (name, "bouc_wen")]
+    selection._exchanged(SimpleNamespace(), found, {}, {name, "bouc_wen"}, RECORDS)  # type: ignore[arg-type]
+    (worth,) = asked
+    assert {each for each in CATALOGUE if worth(SimpleNamespace(name=each))} == {name, "bouc_wen", *more}
+
+
 class Apart(Hypothesis):
     """A hypothesis that leaves different shares in fitted and held-out records."""
 
@@ -539,6 +579,23 @@ def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, 
         now: Any = Made("now", 1, (1.0, 1.0))
         now.bare = bare
         assert (selection.merit_of(now, best, RECORDS) is not None) is accepted
+
+
+@pytest.mark.parametrize("beside", [None, "rate_dependence", "creep"])
+@pytest.mark.parametrize(("name", "left"), [("bouc_wen", (0.4, 0.4)), ("bouc_wen", (0.6, 0.4)), ("drift", (0.6, 0.4))])
+def test_next_to_plays_that_depend_on_the_rate_an_element_takes_most(
+    name: str, left: tuple[float, float], beside: str | None
+) -> None:
+    """`left`: of fitted and of held-out errors of 1; an element that leaves over half of either may be what a rate
+    dependence of another law leaves."""
+    others: dict[str, Effect] = {
+        "rate_dependence": RelaxingPlays(name="rate_dependence", shape="relaxation", time_constant=0.1),
+        "creep": ExponentialCreep(name="creep", time_constants=(1.0,), weights=(0.1,)),
+    }
+    now: Any = Made("now", 1, (1.0, 1.0))
+    now.structure.effects = lambda _: [others[beside]] if beside else []
+    merit = selection.merit_of(now, made(name, 1, left), RECORDS, 0.6)
+    assert (merit is None) is (name == "bouc_wen" and beside == "rate_dependence" and max(left) > 0.5)
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])

@@ -85,7 +85,9 @@ recorded)."""
 
 NEEDLESS = 0.3
 """[times the noise] An earlier effect is dropped if the error without it is larger by less than this: half of
-`FIRST_REMOVES`, so that chance does not drop an accepted effect. Changed by: blind pair."""
+`FIRST_REMOVES`, so that chance does not drop an accepted effect. An alternative whose errors differ by less is not
+followed where nothing follows the accepted effect: the same effects would fail. Changed by: blind pair,
+selection::test_a_rival_that_leaves_the_same_errors_is_not_followed_up."""
 
 P_SURE = 1e-3
 """[probability] The gain from an effect must have at most this p-value. Dozens of shapes are tried per round, so this
@@ -138,7 +140,10 @@ MOST_OF_GAP = 0.5
 """[fraction of the gap above the noise] Records of one loop support a name only if at most this fraction remains with
 the effect, and cannot separate several such effects: one curve up and one down hardly show which shape is right. Set
 by: 180 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not
-recorded)."""
+recorded). Next to plays that depend on the rate, an element has merit only within the same limit: next to thermally
+activated friction, false elements left 0.51 and 0.60; a true one, next to a rate dependence found before the lag that
+it stands for, at most 0.41. Set by (the latter): blind pair 97023 and 97029. Changed by:
+selection::test_next_to_plays_that_depend_on_the_rate_an_element_takes_most."""
 
 LEAST_EXPLAINED = 0.5
 """[fraction of the variance above the noise] Names stand only if at most this fraction of the held-out and of the

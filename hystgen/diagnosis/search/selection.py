@@ -113,6 +113,10 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     if not (at_rest or _enough(held, fitted, needed, records.noise)):
         short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
         return Refusal("little", short.removed, needed * max(records.noise, short.left))
+    if _beside_rates(now, best) and not all(
+        takes_most(each.left, rms(each.without), records.noise) for each in (held, fitted)
+    ):
+        return Refusal("most", held.left, rms(held.without))
     p_value = difference(held.without, held.errors)
     if at_rest:
         return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
@@ -129,6 +133,17 @@ def chance(now: Fitted, best: Tried, records: Records) -> float:
     """p-value of the gain of a tried effect on held-out records, on equal terms."""
     held, _ = _removed(now, best, records)
     return difference(held.without, held.errors)
+
+
+def _beside_rates(now: Fitted, best: Tried) -> bool:
+    """Whether an effect is an element next to plays that depend on the rate.
+
+    Friction has more laws of rates than the catalogue: what a rate dependence leaves of another one changes loops, as
+    an element does. Next to it, an element has merit only if it takes most of the error.
+    """
+    return best.option.name == effects.PARALLEL and any(
+        type(effect).moves_plays() for effect in now.structure.effects(now.shape)
+    )
 
 
 @dataclass(frozen=True)
@@ -737,6 +752,8 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     only once the next effect is included.
     """
     alike = rivals(latest.best, latest.tried, records)
+    if step.merit is None:  # next to the same error, the same effects fail
+        alike = [each for each in alike if not _same(each.fitted, latest.best.fitted, records)]
     if step.merit is None and any(_hidden(step.now, each, records) for each in step.tried):
         alike += _other_shapes(latest.best, latest.tried, records)
     others = {each.name: each for each in reversed(alike)}  # the best one of each name
@@ -761,6 +778,15 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
     return None if chosen[1] is step else chosen
+
+
+def _same(one: Fitted, other: Fitted, records: Records) -> bool:
+    """Whether the errors of two hypotheses differ by so little that no further effect could tell one from the other."""
+    for items in (records.held, records.to_fit):
+        apart = [a - b for a, b in zip(one.errors(items), other.errors(items), strict=True)]
+        if rms(apart) > acceptance.NEEDLESS * records.noise:
+            return False
+    return True
 
 
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
@@ -871,7 +897,11 @@ def _exchanged(
             if fitted is None:
                 continue
             start = without_refit(now, old.name, records)  # a refit could move the others' parameters far
-            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
+            among = {*names, *_look_alikes(old.name)}
+            step = _step(
+                fitted, 0.0, records, lambda option, among=among: option.name in among, start,  # type: ignore[misc]
+                acceptance.FIRST_REMOVES,
+            )
             if step is None or step.merit is None:
                 continue
             better = _that_replaces(now, old.name, step, records)
@@ -891,6 +921,16 @@ def _exchanged(
         else:
             break
     return now, found
+
+
+def _look_alikes(name: str) -> list[str]:
+    """Effects that make the output lag, if this is one of them; each is searched for in the place of the others.
+
+    Which of them is there may show only once the other effects are known: next to an element of the wrong shape, or
+    without one, a lag can be among the best of no round.
+    """
+    lagging = [each for each in effects.CATALOGUE if effects.shapes(each)[0].rank < math.inf]
+    return lagging if name in lagging else []
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
