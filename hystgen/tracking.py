@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator.chain.layout import LEAST_LATE
+from hystgen.identification import instruments
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
 from hystgen.records import in_units
@@ -139,7 +140,7 @@ def track(
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
-    given, records = records, in_units(records, model.parameters.units)
+    given, records = records, instruments.put_right(in_units(records, model.parameters.units))
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
     model.inverse()
     compensators = {PLAYS: model.without(model.effects), WHOLE: model}

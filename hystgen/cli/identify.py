@@ -132,10 +132,10 @@ def identify(
         console.say(fit.table())
         console.say(output)
         if plot:
-            drawing.picture(lambda: plots.fit_figure(fit, read), plot)
+            drawing.picture(lambda: plots.fit_figure(fit, fit.records), plot)
             console.say(plot)
         if report:
-            console.say(str(pages.write(fit, read, report, Path(output).name)))
+            console.say(str(pages.write(fit, fit.records, report, Path(output).name)))
 
     common.guarded(data[0], run)
 

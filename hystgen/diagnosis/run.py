@@ -25,7 +25,7 @@ from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects.base import Effect, Place
-from hystgen.identification import P0_FLOOR, auto, quality, stage_content
+from hystgen.identification import P0_FLOOR, auto, instruments, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.joint import Kept
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
@@ -92,7 +92,7 @@ def diagnose(
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects must be classes, as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
-    read = in_units(read, model.parameters.units, sources=[*fitted, *others])
+    read = instruments.put_right(in_units(read, model.parameters.units, sources=[*fitted, *others]))
     nominal = _with_units(model.parameters, read)
     given, unit = nominal.model.effects, nominal.units.output
     before = None if history is None else visited(history)

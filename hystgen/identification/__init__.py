@@ -24,7 +24,7 @@ from hystgen.effects import PARALLEL
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import elements, gpi, pi, prepared, quality, reduction
+from hystgen.identification import elements, gpi, instruments, pi, prepared, quality, reduction
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
@@ -140,7 +140,7 @@ def identify(
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
-    read = in_units(read, named=("units", units), sources=[*to_fit, *to_hold])
+    read = instruments.put_right(in_units(read, named=("units", units), sources=[*to_fit, *to_hold]))
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")

@@ -75,7 +75,9 @@ def report_fit(
     if not isinstance(fit, Fit):
         raise TypeError(f"fit must be a result of hystgen.identify, not {arguments.kind(fit)}")
     sources = [*several(records), *several(holdout)]
-    return write(fit, in_units(read_records(sources), fit.parameters.units, sources=sources), folder)
+    read = in_units(read_records(sources), fit.parameters.units, sources=sources)
+    same = [record.name for record in read] == [record.name for record in fit.records]
+    return write(fit, fit.records if same else read, folder)  # those of the fit are put right
 
 
 def write(
