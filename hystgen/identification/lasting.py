@@ -39,17 +39,24 @@ AGREES = 0.5
 and is not off by more than this inverted elsewhere: an isolated fault has 0 there, and so has a jump that is made up
 for."""
 
+RATE, USUAL = 0.5, 0.9
+"""Where the drive's rate changes by more than this fraction of its quantile `USUAL`, a step may be due to that."""
+
 ALONG = 0.9
-"""If more than this fraction of several steps, of both signs, follow the drive, they are the actuator's own jumps."""
+"""More than this fraction of the actuator's own jumps go with the drive, up and down."""
+
+NEARBY, RECURS = 0.1, 0.25
+"""[fraction of the drive's range] Its own jumps recur within this of each other, in more than a quarter of the passes of
+the drive: some stay out where a smaller loop does not undo the jump before."""
 
 MOST = 50
 """Largest number of steps in a record; more belong to the actuator, or to a sensor of no use."""
 
-PLAYS, ROWS = 16, 4000
+PLAYS, ROWS = 12, 4000
 """Number of plays in the fit to the whole record, and of samples that are compared in it."""
 
-NEAR = 16
-"""[samples] On either side of a step, this many errors of that fit give its size; fewer between two steps."""
+NEAR = 30
+"""[samples] On either side of a step, this many errors of that fit give its size; fewer up to the next step or turn."""
 
 WHOLE_RANGE = 0.5
 """[fraction of the output's range] Larger jumps may be those of a wrapped counter."""
@@ -161,8 +168,13 @@ def _bits(modulus: float, within: float = 1e-9) -> int:
 
 def _local(x: Array, at: Indices) -> Array:
     """Median of x (N,) over the neighbours of samples `at`, without these."""
-    beside = np.concatenate([np.arange(-AROUND, 0), np.arange(1, AROUND + 1)])
-    places = at[:, None] + beside
+    return _median(x, at[:, None] + np.concatenate([np.arange(-AROUND, 0), np.arange(1, AROUND + 1)]))
+
+
+def _median(x: Array, places: Indices) -> Array:
+    """Median of x (N,) over each row of places, without those outside."""
+    if not len(places):
+        return np.empty(0)
     inside = (places >= 0) & (places < len(x))
     return np.asarray(np.nanmedian(np.where(inside, x[np.clip(places, 0, len(x) - 1)], np.nan), axis=1))
 
@@ -185,16 +197,25 @@ def _slips(v: Array, y: Array, move: Array) -> Steps | None:
         at = at[lasting]
         if len(at) <= 0.5 * sudden:  # most jumps are made up for: so may be the others
             return None
-    found = Steps(at + 1, whole.refined())
+    found = Steps(at + 1, _sizes(v, y, at))
     # what remains must be a motion: of an output that only jumps, nothing would
     return found if float(np.sum(np.abs(found.sizes))) < float(np.ptp(found.bridged(y))) else None
 
 
 def _its_own(at: Indices, v: Array, y: Array, move: Array) -> bool:
-    """Whether steps of both signs all go where the drive pushes the output, as an actuator's own jumps do."""
+    """Whether steps of both signs all go where the drive pushes the output, and most times that it passes there, as an
+    actuator's own jumps do."""
     signs = np.sign(move[at] - _local(move, at))
-    pushed = np.sign(faults.sensitivity(y, v) * _local(np.diff(v), at))
-    return len(np.unique(signs)) > 1 and float(np.mean(signs == pushed)) > ALONG
+    drive = _local(np.diff(v), at)
+    pushed = np.sign(faults.sensitivity(y, v) * drive)
+    if len(np.unique(signs)) < 2 or float(np.mean(signs == pushed)) <= ALONG:
+        return False
+    often = []
+    for k, here in enumerate(at.tolist()):
+        alike = (signs == signs[k]) & (np.abs(v[at] - v[here]) < NEARBY * float(np.ptp(v)))
+        above = v > v[here] if drive[k] > 0.0 else v < v[here]
+        often.append(np.count_nonzero(alike) / max(np.count_nonzero(above[1:] & ~above[:-1]), 1))
+    return float(np.mean(often)) > RECURS
 
 
 def _sudden(v: Array, y: Array, move: Array) -> Indices:
@@ -218,7 +239,10 @@ def _sudden(v: Array, y: Array, move: Array) -> Indices:
     drive = np.diff(v)
     pushed = np.abs(slope * (drive[some] - _local(drive, some)))
     sudden = (excess > least) & (excess > CLEAR * np.max(others, axis=1)) & (pushed < EXPLAINED * excess)
-    return some[sudden]
+    at = some[sudden]
+    # where the drive's rate jumps, what depends on it does too, as the voltage of a cell whose current turns
+    ahead, behind = (_median(drive, at[:, None] + side) for side in (np.arange(-AROUND, 0), np.arange(1, AROUND + 1)))
+    return at[np.abs(behind - ahead) < RATE * float(np.quantile(np.abs(drive), USUAL))]
 
 
 def _without_returns(at: Indices, move: Array, samples: int) -> Indices:
@@ -238,13 +262,11 @@ def _without_returns(at: Indices, move: Array, samples: int) -> Indices:
 
 @dataclass(frozen=True)
 class _Whole:
-    """A fit to a whole record of plays, a drift and a step behind each sample `at`: the steps' `sizes` (k,), the
-    `motion` (N,) that plays and drift explain, the `errors` (N,) and their `rms`."""
+    """A fit to a whole record of plays, a drift and a step behind each sample `at`: the steps' `sizes` (k,), and the
+    `rms` error."""
 
-    at: Indices
     sizes: Array
-    motion: Array
-    errors: Array
+    rms: float
 
     @classmethod
     def of(cls, v: Array, y: Array, at: Indices) -> _Whole:
@@ -260,35 +282,23 @@ class _Whole:
         table = np.vstack([rows, ones, drift, behind])
         with parallel.one_thread():
             weights, *_ = np.linalg.lstsq(table[:, some].T, y[some], rcond=pi.SENSED_RANK)
-        number = len(table) - len(at)
-        motion = weights[:number] @ table[:number]
-        errors = y - motion - weights[number:] @ table[number:]
-        errors[:first] = np.nan
-        return cls(at, weights[number:], motion, errors)
-
-    @property
-    def rms(self) -> float:
-        """rms error of the fit."""
-        return float(np.sqrt(np.nanmean(self.errors**2)))
-
-    def refined(self) -> Array:
-        """The sizes, corrected by the errors beside each step, which depend less on the plays."""
-        edges = [0, *(self.at + 1).tolist(), len(self.errors)]
-        found = []
-        for k, size in enumerate(self.sizes, start=1):
-            here = edges[k]
-            number = min(NEAR, here - edges[k - 1], edges[k + 1] - here)
-            before, after = self.errors[here - number : here][::-1], self.errors[here : here + number]
-            if number < AROUND or not np.isfinite(before).all():
-                found.append(size)
-            else:
-                found.append(size + _at_start(after) - _at_start(before))
-        return np.array(found)
+        errors = y[some] - weights @ table[:, some]
+        return cls(weights[len(table) - len(at) :], float(np.sqrt(np.mean(errors**2))))
 
 
-def _at_start(x: Array) -> float:
-    """The level of x (N,) half a sample before it begins, by the median line through it (Theil, Sen)."""
-    place = np.arange(len(x)) + 0.5
-    one, other = np.triu_indices(len(x), 1)
-    slope = float(np.median((x[other] - x[one]) / (place[other] - place[one])))
-    return float(np.median(x - slope * place))
+def _sizes(v: Array, y: Array, at: Indices) -> Array:
+    """The size of each step, beside a smooth course of the output over time and drive up to the next turn or step."""
+    steps = np.concatenate([[-1], at, [len(y) - 1]])
+    edges = np.sort(np.concatenate([steps, pi.corners(v)]))
+    found = []
+    for k, here in enumerate(at.tolist(), start=1):
+        least = (min(AROUND, here - int(steps[k - 1])), min(AROUND, int(steps[k + 1]) - here))
+        first = here + 1 - max(least[0], min(NEAR, here - int(np.max(edges[edges < here]))))
+        stop = here + 1 + max(least[1], min(NEAR, int(np.min(edges[edges > here])) - here))
+        place = np.linspace(-1.0, 1.0, stop - first)
+        drive = v[first:stop] - v[here]
+        behind = np.arange(first, stop) > here
+        table = np.column_stack([np.ones(len(place)), place, place**2, drive, behind])
+        weights, *_ = np.linalg.lstsq(table, y[first:stop], rcond=pi.SENSED_RANK)
+        found.append(weights[-1])
+    return np.array(found)
