@@ -140,6 +140,11 @@ def counted(number: int, one: str, several: str = "") -> str:
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
+def capital(text: str) -> str:
+    """The text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]
+
+
 FACTOR = 10.0
 """[times] Ratios from this value on are worded as factors: "32 times" is easier to read than "3200 %", which has more
 than the three digits shown. Only wording depends on it. Changed by:

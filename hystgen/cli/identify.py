@@ -10,7 +10,7 @@ from typing import Any, Unpack
 import click
 
 from hystgen.basics import console
-from hystgen.basics.problems import counted
+from hystgen.basics.problems import capital, counted
 from hystgen.cli import common
 
 
@@ -45,13 +45,14 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "--units", metavar="V,um", callback=_units,
     help="units of drive and output, to which records are converted; default: the records'",
 )
+@click.option("--strict", is_flag=True, help="exit with 1 where the figures say that the model is of no use")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @common.record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
-    plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
+    strict: bool, plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
     jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
@@ -83,7 +84,7 @@ def identify(
         # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
-            **options, **how,
+            strict=strict, **options, **how,
         )
         return
     for option, given in only_batch.items():
@@ -136,6 +137,10 @@ def identify(
             console.say(plot)
         if report:
             console.say(str(pages.write(fit, fit.records, report, Path(output).name)))
+        step, command = fit.verdict.next_step(output, data, holdout)
+        console.note(f"{capital(fit.verdict.why)}. Your next step: {step}:\n    {command}")
+        if strict and fit.verdict.useless:
+            raise common.Failed(f"error: {data[0]}: the model is of no use: {fit.verdict.why}", 1)
 
     common.guarded(data[0], run)
 

@@ -24,12 +24,13 @@ from hystgen.effects import PARALLEL
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import elements, gpi, instruments, pi, prepared, quality, reduction
+from hystgen.identification import elements, gpi, instruments, pi, prepared, quality, reduction, verdict
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import ErrorRow
 from hystgen.identification.reduction import Course
+from hystgen.identification.verdict import UselessError
 from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
 
@@ -67,10 +68,6 @@ HALVED = 0.5
 at most this of the best other model's error. Effects that are no such hysteresis leave more, of the whole error 0.78
 and more with several loops, 0.36 (ageing) with a single one. Set by: every eighth case of `make blind FIRST=97000`."""
 
-ABOVE_NOISE = 1.25
-"""[times the noise] `auto` takes them only if that error is larger than this, as a smaller one may be noise that is not
-white; the same limit as in a diagnosis. Set by: blind none."""
-
 
 @arguments.checked
 def identify(
@@ -90,6 +87,7 @@ def identify(
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
+    strict: bool = False,
     progress: bool = False,
 ) -> Fit:
     """Fit a model to measured records.
@@ -117,6 +115,7 @@ def identify(
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
       part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
+    - `strict`: raise UselessError where the figures say that the model is of no use (`Fit.verdict`).
     - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
     The start memory in the parameter file is the memory after `history`. Without a history it is 0, as in a virgin
@@ -204,7 +203,10 @@ def identify(
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     parameters = _parameters(name, units, drive, fitted, offset, compared[0])
-    return Fit(parameters, tuple(rows), tuple(reported), sure, masks, before, tuple(read))
+    said = verdict.verdict(errors, held_errors, quality.wrong_way(fitted), (units or {}).get("output", ""))
+    if strict and said.useless:
+        raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")
+    return Fit(parameters, tuple(rows), tuple(reported), sure, masks, said, before, tuple(read))
 
 
 def check_options(
@@ -296,7 +298,7 @@ def _choose(tried: Sequence[_Tried]) -> int:
     if any(plain) and not all(plain):
         noise = quality.noise_of([each.course for each in tried[plain.index(True)].errors])
         best = min(rms for rms, alone in zip(found, plain, strict=True) if alone)
-        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if best > ABOVE_NOISE * noise else 0.0
+        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if best > verdict.ABOVE_NOISE * noise else 0.0
         found = [rms if alone or rms <= most else math.inf for rms, alone in zip(found, plain, strict=True)]
     enough = MODEL_PARSIMONY * min(found)
     return next(k for k, rms in enumerate(found) if rms <= enough)
@@ -524,6 +526,7 @@ __all__ = [
     "Fit",
     "IdentificationError",
     "Used",
+    "UselessError",
     "check_options",
     "identifier_from",
     "identify",

@@ -14,7 +14,7 @@ import numpy as np
 
 from hystgen import identification
 from hystgen.basics import arguments, drawing, writing
-from hystgen.basics.problems import counted, percent
+from hystgen.basics.problems import capital, counted, percent
 from hystgen.basics.version import __version__
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
@@ -167,8 +167,10 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     said += [f"Note that {text}." for text in properties.warnings(Model(fit.parameters))]
     if fit.warnings:
         said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
-    command = f"hystgen emit {parameter_file} -o firmware/{operator}"
-    return [*(Text(text) for text in said), Text("Your next step: write the C.", command)]
+    to_fit, held = ([each.name for each in fit.used if each.held_out is out] for out in (False, True))
+    step, command = fit.verdict.next_step(parameter_file, to_fit, held, operator)
+    why = "" if fit.verdict.kind == "good" else f"{capital(fit.verdict.why)}. "
+    return [*(Text(text) for text in said), Text(f"{why}Your next step: {step}.", command)]
 
 
 def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> list[Section]:

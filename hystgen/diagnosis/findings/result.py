@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
+from hystgen.basics.problems import capital
 from hystgen.diagnosis.findings import kinds
 from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structured
 from hystgen.diagnosis.search import acceptance
@@ -264,7 +265,7 @@ class Diagnosis:
 
     def sentence(self) -> str:
         """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
-        parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
+        parts = [capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
         parts += [*self._limits(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
             parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
@@ -407,10 +408,6 @@ class Diagnosis:
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
         return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
-
-
-def _capital(text: str) -> str:
-    return text[0].upper() + text[1:]
 
 
 def plain(value: object) -> Any:
