@@ -127,7 +127,8 @@ def late(model: Model, records: Sequence[Record]) -> str:
 
 
 def track(
-    model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0
+    model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0,
+    clock_skew: float | str | None = None,
 ) -> Tracking:
     """The tracking error with each compensator if the records' motions were the references.
 
@@ -135,12 +136,12 @@ def track(
     model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive. `straight
     line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
     without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
-    `rest` come before every record; `skip`: seconds at the start of each record that are not compared. Raises
+    `rest` come before every record; `skip`: seconds at the start of each record that are not compared; `clock_skew`: as for `identify`. Raises
     NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
-    given, records = records, instruments.put_right(in_units(records, model.parameters.units))
+    given, records = records, instruments.put_right(in_units(records, model.parameters.units), clock_skew)
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
     model.inverse()
     compensators = {PLAYS: model.without(model.effects), WHOLE: model}

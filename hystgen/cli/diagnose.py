@@ -62,10 +62,12 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @common.effects_option
 @common.record_options
 @common.skip_option
+@common.skew_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
     plan: bool, max_rate: float | None, rate: float | None, dac_bits: int | None, dac_range: str | None,
     dac_coding: str | None, session: str | None, history: str | None, rest: float, skip: float,
+    clock_skew: float | str | None,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effects, and the model with them.
@@ -87,7 +89,7 @@ def diagnose(
     if plan:
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
-            "--session": session, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
+            "--clock-skew": clock_skew, "--session": session, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
         }
         given = [option for option, value in unused.items() if value]
         if given:
@@ -126,7 +128,7 @@ def diagnose(
     common.keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
     common.guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = common.history_values(history)
-    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip}
+    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip, "clock_skew": clock_skew}
     read_as = common.reading_options(**reading)
 
     def run() -> None:

@@ -39,6 +39,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "'holdout/{unit}.csv'",
 )
 @common.skip_option
+@common.skew_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
@@ -51,8 +52,8 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @common.record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
-    strict: bool, plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
+    holdout: tuple[str, ...], skip: float, clock_skew: float | str | None, loading_curve: bool, name: str | None,
+    units: dict[str, str] | None, strict: bool, plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
     jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
@@ -74,6 +75,7 @@ def identify(
         "rest": rest,
         "units": units,
         "skip": skip,
+        "clock_skew": clock_skew,
         "loading_curve": loading_curve,
     }
     only_batch: dict[str, object] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}

@@ -57,6 +57,7 @@ def diagnose(
     columns: dict[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
+    clock_skew: float | str | None = None,
     progress: bool = False,
 ) -> Diagnosis:
     """Find the effects that a nominal model is missing.
@@ -66,7 +67,7 @@ def diagnose(
     judged; if none are given, or too few of their samples can be compared, every third record or the end of each is
     held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
     `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
-    although their drive still moves the plays. `effects`: further effects to try.
+    although their drive still moves the plays. `effects`: further effects to try. `clock_skew`: as for `identify`.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
     weights so as to minimise the free-run error, and accepted if it removes a substantial part of the held-out error
@@ -92,7 +93,8 @@ def diagnose(
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects must be classes, as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
-    read = instruments.put_right(in_units(read, model.parameters.units, sources=[*fitted, *others]))
+    read = in_units(read, model.parameters.units, sources=[*fitted, *others])
+    read = instruments.put_right(read, clock_skew)
     nominal = _with_units(model.parameters, read)
     given, unit = nominal.model.effects, nominal.units.output
     before = None if history is None else visited(history)

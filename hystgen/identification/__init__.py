@@ -24,7 +24,7 @@ from hystgen.effects import PARALLEL
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import elements, gpi, instruments, pi, prepared, quality, reduction, verdict
+from hystgen.identification import clocks, elements, gpi, instruments, pi, prepared, quality, reduction, verdict
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
@@ -87,6 +87,7 @@ def identify(
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
+    clock_skew: float | str | None = None,
     strict: bool = False,
     progress: bool = False,
 ) -> Fit:
@@ -115,6 +116,9 @@ def identify(
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
       part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
+    - `clock_skew`: growth of the delay of y after v that is taken out of every record, in ppm of time, because drive and
+      sensor were sampled with clocks of their own; `auto`: that of each record, where it is significant. By default it
+      is only reported.
     - `strict`: raise UselessError where the figures say that the model is of no use (`Fit.verdict`).
     - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
@@ -139,7 +143,8 @@ def identify(
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
-    read = instruments.put_right(in_units(read, named=("units", units), sources=[*to_fit, *to_hold]))
+    read = in_units(read, named=("units", units), sources=[*to_fit, *to_hold])
+    read = instruments.put_right(read, clock_skew)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
@@ -219,6 +224,7 @@ def check_options(
     p0_floor: float = P0_FLOOR,
     loading_curve: bool = False,
     units: Mapping[str, str] | None = None,
+    clock_skew: float | str | None = None,
     **_: object,
 ) -> tuple[gpi.How, tuple[float, ...] | None]:
     """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
@@ -232,6 +238,7 @@ def check_options(
         before = ()
     arguments.number("rest", rest, "seconds", 0.0)
     arguments.number("skip", skip, "seconds", 0.0)
+    clocks.checked(clock_skew)
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:

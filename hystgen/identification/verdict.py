@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.identification import faults, pi
+from hystgen.identification import faults, pi, quality
 from hystgen.identification.pi import FreeRunErrors, IdentificationError
 from hystgen.identification.reduction import Course
 
@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 ABOVE_NOISE = 1.25
 """[times the noise] A residual above this stands clear of the noise; the same limit as in a diagnosis, where it is set
 by: blind none."""
+
+COLOURED, SHORT = 2.0, 4.0
+"""[times the noise] Limit for a residual whose correlation is shorter than this many [samples]: noise behind a filter,
+or between samples, exceeds what neighbouring samples show; the same limit as in a diagnosis."""
 
 HALF = 0.5
 """[fraction of the variance of the output] A model that explains less leaves more than it explains."""
@@ -73,7 +77,8 @@ def verdict(
     judged = held or own
     left, noise = _rms([each.error for each in judged]), _noise(judged)
     u, of = f" {unit}" if unit else "", "held-out samples" if held else "the records"
-    least = max(ABOVE_NOISE * noise, faults.LITTLE * max(each.course.output_range for each in judged))
+    times = max(quality.correlation_time(e[np.isfinite(e)]) for e in (each.error for each in judged))
+    least = max((COLOURED if times < SHORT else ABOVE_NOISE) * noise, faults.LITTLE * max(each.course.output_range for each in judged))
     line, share = _line(own, judged), max(_explained(own), _explained(judged))
     off = f"on {of} the model is off by {left:.3g}{u} rms"
     if wrong_way:
@@ -86,8 +91,8 @@ def verdict(
         alone = whole or _rms([each.error for each in own]) > pi.CLEARLY * _line(own, own)
         if left > pi.CLEARLY * line and alone:
             return Verdict("missing", f"{off} and a straight line by {line:.3g}{u}, hardly more", True)
-        times = f"{left / noise:.2g} times" if left <= 100.0 * noise else "far above"
-        return Verdict("missing", f"{off}, {times} the noise")
+        above = f"{left / noise:.2g} times" if left <= 100.0 * noise else "far above"
+        return Verdict("missing", f"{off}, {above} the noise")
     if not held:
         return Verdict("untold", "nothing was held out, so the error on other records is unknown")
     if line <= least and noise > faults.LITTLE * max(each.course.output_range for each in judged):
