@@ -74,8 +74,8 @@ def test_the_verdict_is_what_the_figures_say(what: str) -> None:
 ])  # fmt: skip
 def test_the_next_step_and_the_exit_code(run: Run, tmp_path: Path, what: str, code: int, command: str) -> None:
     record, model = written(tmp_path, what), tmp_path / "m.yaml"
-    got, _, said = run("identify", record, "-o", model, "--strict")
+    got, table, said = run("identify", record, "-o", model, "--strict")
     assert got == code, said
-    assert f"    {command.format(m=model, r=record)}\n" in f"{said}\n"
+    assert f"    {command.format(m=model, r=record)}\n" in table
     assert ("the model is of no use" in said) == bool(code)
     assert run("identify", record, "-o", model)[0] == 0

@@ -133,14 +133,14 @@ def identify(
         fit = older.on(fit)
         fit.write(output)
         console.say(fit.table())
+        step, command = fit.verdict.next_step(output, data, holdout)
+        console.say(f"{capital(fit.verdict.why)}. Your next step: {step}:\n    {command}\n")
         console.say(output)
         if plot:
             drawing.picture(lambda: plots.fit_figure(fit, fit.records), plot)
             console.say(plot)
         if report:
             console.say(str(pages.write(fit, fit.records, report, Path(output).name)))
-        step, command = fit.verdict.next_step(output, data, holdout)
-        console.note(f"{capital(fit.verdict.why)}. Your next step: {step}:\n    {command}")
         if strict and fit.verdict.useless:
             raise common.Failed(f"error: {data[0]}: the model is of no use: {fit.verdict.why}", 1)
 

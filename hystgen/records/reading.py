@@ -155,10 +155,12 @@ class Reading:
         found = finder.find(self.need, self.sample_time is not None, steps, self.points)
         for text in finder.problems:
             self.problem(text, line)
-        steps = finder.steps
-        if len({step.start for step in steps}) > 1:
-            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
+        # a given sample time says how far samples are apart, not when the first was taken
+        begun = [] if "t" in found else [step for step in steps if step.belongs(c.name for c in found.values())]
+        if len({step.start for step in begun}) > 1:
+            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in begun)
             self.problem(f"the columns start at different times: {starts}; export them with a common time", line)
+        steps = finder.steps
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, but the file has {said}; give --sample-time", line)

@@ -226,7 +226,7 @@ class Line(Finding):
 
 @dataclass(frozen=True)
 class Ripple(Finding):
-    """A periodic error over position; `pitch`: output units; `converter_step`: whether this is the converter's step."""
+    """A periodic error over position; `pitch`: output units."""
 
     kind = "ripple"
     optional = frozenset(("repaired",))
@@ -234,7 +234,6 @@ class Ripple(Finding):
     amplitude: float
     share: float
     records: tuple[str, ...]
-    converter_step: bool
     repaired: bool = False
 
     @property
@@ -246,13 +245,38 @@ class Ripple(Finding):
         u = _unit(unit)
         return (
             f"a ripple over the position with a pitch of {self.pitch:.4g}{u}, amplitude {self.amplitude:.3g}{u}, in "
-            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance; "
-            + ("its pitch is the step of the converter" if self.converter_step else INTERPOLATION)
+            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance; {INTERPOLATION}"
             + _taken_out(self.repaired)
         )
 
 
-Periodic = Line | Ripple
+@dataclass(frozen=True)
+class Quantisation(Fault):
+    """The steps of a converter, which are no ripple: an error over position with their pitch, output units."""
+
+    kind, noun, qualifier = "quantisation", "coarse converter", ""
+    optional = frozenset(("repaired",))
+    pitch: float
+    amplitude: float
+    share: float
+    records: tuple[str, ...]
+    repaired: bool = False
+
+    @property
+    def place(self) -> float:
+        """The step, output units."""
+        return self.pitch
+
+    def sentence(self, unit: str | None) -> str:
+        return (
+            f"the converter's steps of {self.pitch:.4g}{_unit(unit)} are {100.0 * self.share:.0f} % of the error's "
+            f"variance in {several(self.records)}: a finer converter, or noise of half a step, would show more"
+            + _taken_out(self.repaired)
+        )
+
+
+Periodic = Line | Ripple | Quantisation
+"""Errors that recur evenly over time or over position."""
 
 
 @dataclass(frozen=True)
@@ -410,7 +434,7 @@ EVEN = 0.3, 0.7
 
 # Words -------------------------------------------------------------------------------------------------------
 
-FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, OtherHistory)
+FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, Quantisation, OtherHistory)
 """The order in which faults are listed."""
 
 
