@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ParamSpec, cast
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 from hystgen import diagnosis
 from hystgen.basics import drawing, parallel
@@ -213,7 +213,6 @@ WHAT = {
     "drop_outs": "drop-outs",
     "held_samples": "held samples",
     "isolated_samples": "isolated samples",
-    "quantisation": "steps of the converter",
     "swapped_channels": "drive and displacement exchanged",
     "history": "a history other than the given one",
 }
@@ -225,14 +224,11 @@ def _faults(result: Result) -> list[Text | HtmlTable]:
         disturbed = any(not isinstance(each, Structured) for each in result.unexplained)
         return [Text("None in single samples; disturbances are listed above." if disturbed else "None were seen.")]
     rows = [["record", "what", "times", "samples", "first at (s)", label("level", result.unit), "done"]]
-    for each in seen:
-        if "records" in each:  # a finding about several
-            each["record"] = ", ".join(map(str, cast("Sequence[str]", each["records"])))
     for each in sorted(seen, key=lambda one: (str(one["record"]), str(one["kind"]))):
         single = each["kind"] in ("saturated", "isolated_samples")
         samples = each.get("count") if single else each.get("samples")
-        done = {"swapped_channels": "put right", "quantisation": "removed" if "repaired" in each else "kept"}.get(
-            str(each["kind"]), "bridged" if each.get("channel") == "v" else "not compared"
+        done = "put right" if each["kind"] == "swapped_channels" else (
+            "bridged" if each.get("channel") == "v" else "not compared"
         )
         rows.append(
             [
@@ -241,7 +237,7 @@ def _faults(result: Result) -> list[Text | HtmlTable]:
                 "" if single or "count" not in each else str(each["count"]),
                 "" if samples is None else str(samples),
                 f"{each['first']:.6g}" if "first" in each else "",
-                f"{each.get('level', each.get('pitch')):.6g}" if "level" in each or "pitch" in each else "",
+                f"{each['level']:.6g}" if "level" in each else "",
                 done,
             ]
         )

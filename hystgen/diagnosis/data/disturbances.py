@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hystgen.diagnosis.data.items import FittedLike, Item
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import converter_step, peaks, still
-from hystgen.diagnosis.findings.kinds import Line, Periodic, Quantisation, Ripple, StickSlip
+from hystgen.diagnosis.findings.kinds import Line, Ripple, StickSlip
 from hystgen.diagnosis.search import acceptance
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ MAINS_HARMONICS = (1, 2, 3, 5)
 class Removed:
     """A line or ripple, the errors without it, and its fraction of the variance of all errors."""
 
-    finding: Periodic
+    finding: Line | Ripple
     errors: list[Array]
     share: float
 
@@ -296,7 +296,7 @@ def _ripple(
         others = np.linalg.lstsq(matrix - own, right - own_right, rcond=None)[0]
         holds += bool(np.sum((e - x @ others) ** 2) < (1.0 - acceptance.LINE_SHARE) * np.sum(e**2))
     solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    if holds < acceptance.COMMON_SHARE * len(pieces):
+    if holds < acceptance.COMMON_SHARE * len(pieces) or all(_quantised(items[k].y, pitch) for k in parts):
         return None
     share = removed_share([e for _, e in pieces], [e - x @ solution for x, e in pieces])
     if share < acceptance.LINE_SHARE:
@@ -306,8 +306,7 @@ def _ripple(
         e = error.copy()
         e[motion.at] -= table @ solution
         after.append(e)
-    steps = all(abs(converter_step(items[k].y) / pitch - 1.0) < acceptance.CONVERTER_STEP for k in parts)
-    finding = (Quantisation if steps else Ripple)(
+    finding = Ripple(
         pitch=float(f"{pitch:.4g}"),
         amplitude=float(np.hypot(solution[0], solution[1])),
         share=share,
@@ -316,25 +315,31 @@ def _ripple(
     return Removed(finding, after, share)
 
 
+def _quantised(y: Array, pitch: float) -> bool:
+    """Whether a pitch is the converter's step or a whole fraction of it: that is the resolution, and counts as noise."""
+    parts = converter_step(y) / pitch
+    return bool(np.isfinite(parts) and parts > 0.5 and abs(parts / round(parts) - 1.0) < acceptance.CONVERTER_STEP)
+
+
 # The strongest line or ripple first --------------------------------------------------------------------------
 
 
 Way = Callable[[Sequence[Item], Sequence[Array]], Removed | None]
 
 
-def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Periodic], list[Array]]:
+def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
     """Lines in the errors of several records, the strongest first, and the errors without them."""
     return _strongest_first(items, errors, (in_time, in_position), 0.0)
 
 
-def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Periodic], list[Array]]:
+def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
     """Like `lines`, but only for steady lines and ripples that dominate the errors, not caused by the actuator."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 
 def _strongest_first(
     items: Sequence[Item], errors: Sequence[Array], ways: Sequence[Way], least: float
-) -> tuple[list[Periodic], list[Array]]:
+) -> tuple[list[Line | Ripple], list[Array]]:
     remaining, found = list(errors), []
     for _ in range(acceptance.MOST_LINES):
         seen = [line for line in (way(items, remaining) for way in ways) if line is not None and line.share >= least]
@@ -362,7 +367,7 @@ class Cleaned:
 
     measured: Prepared
     clean: Prepared
-    lines: tuple[Periodic, ...] = ()
+    lines: tuple[Line | Ripple, ...] = ()
 
     def seen_by(self, fitted: FittedLike) -> Cleaned:
         """The measured records without the lines in a model's errors; its predictions locate the ripples."""
@@ -412,7 +417,7 @@ def _moving(ready: Prepared) -> Prepared:
     return replace(ready, to_fit=[without_holds(item) for item in ready.to_fit])
 
 
-def is_known(line: Periodic, others: Sequence[Periodic]) -> bool:
+def is_known(line: Line | Ripple, others: Sequence[Line | Ripple]) -> bool:
     """Whether a line is the remainder of a known line."""
     return any(
         each.kind == line.kind and abs(line.place / each.place - 1.0) < acceptance.SAME_LINE for each in others

@@ -15,15 +15,7 @@ from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.items import Item, compared, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
-from hystgen.diagnosis.findings.kinds import (
-    Fault,
-    Finding,
-    Periodic,
-    Quantisation,
-    Ripple,
-    Structured,
-    times_noise,
-)
+from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structured, times_noise
 from hystgen.diagnosis.findings.result import (
     Contender,
     FitErrors,
@@ -70,10 +62,10 @@ def result_of(
     gap = Gap(as_given, *(FitErrors(*map(rms, each)) for each in (before, after)))
     remaining = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
     everything = [*ready.to_fit, *ready.held]
-    rivals, open_ends = found.not_separable, any(not isinstance(each, Fault) for each in remaining)
+    rivals = found.not_separable
     structured = any(isinstance(each, Structured) for each in remaining)
     result = Result(
-        verdict="effects_found" if found.found else "unexplained" if open_ends else "nothing_missing",
+        verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",
         noise_floor=noise.rms,
         output_range=max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         unit=unit,
@@ -168,7 +160,7 @@ def _unexplained(
     """The remaining error beyond noise and recording faults; `usual`: error on fitted records."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
-    known = [each for each in odd if isinstance(each, Periodic)]
+    known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
     # if the position is not predicted well enough to remove a ripple, the ripple hides jumps as noise does
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])

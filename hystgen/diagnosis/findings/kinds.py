@@ -250,33 +250,7 @@ class Ripple(Finding):
         )
 
 
-@dataclass(frozen=True)
-class Quantisation(Fault):
-    """The steps of a converter, which are no ripple: an error over position with their pitch, output units."""
-
-    kind, noun, qualifier = "quantisation", "coarse converter", ""
-    optional = frozenset(("repaired",))
-    pitch: float
-    amplitude: float
-    share: float
-    records: tuple[str, ...]
-    repaired: bool = False
-
-    @property
-    def place(self) -> float:
-        """The step, output units."""
-        return self.pitch
-
-    def sentence(self, unit: str | None) -> str:
-        return (
-            f"the converter's steps of {self.pitch:.4g}{_unit(unit)} are {100.0 * self.share:.0f} % of the error's "
-            f"variance in {several(self.records)}: a finer converter, or noise of half a step, would show more"
-            + _taken_out(self.repaired)
-        )
-
-
-Periodic = Line | Ripple | Quantisation
-"""Errors that recur evenly over time or over position."""
+Periodic = Line | Ripple
 
 
 @dataclass(frozen=True)
@@ -434,7 +408,7 @@ EVEN = 0.3, 0.7
 
 # Words -------------------------------------------------------------------------------------------------------
 
-FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, Quantisation, OtherHistory)
+FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, OtherHistory)
 """The order in which faults are listed."""
 
 
