@@ -25,7 +25,7 @@ from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects.base import Effect, Place
-from hystgen.identification import P0_FLOOR, auto, instruments, quality, stage_content
+from hystgen.identification import P0_FLOOR, STEP_DIGITS, auto, instruments, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.joint import Kept
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
@@ -133,9 +133,10 @@ def diagnose(
 
 
 def _with_units(parameters: Parameters, records: Sequence[Record]) -> Parameters:
-    """The parameters, with missing units taken from the records."""
+    """The parameters, with missing units taken from the records, and their sample time."""
     units, _ = agreed_units(records, parameters.units.model_dump())
-    return parameters.model_copy(update={"units": parameters.units.model_copy(update=units)})
+    step = next((rounded(record.sample_time, STEP_DIGITS) for record in records if record.timed), None)
+    return parameters.model_copy(update={"units": parameters.units.model_copy(update=units), "recorded_at": step})
 
 
 NO_FRONT = "the memoryless part of the model was left out: held-out records are predicted better without it"

@@ -60,6 +60,9 @@ BEYOND = 0.1
 """Largest excursion by which a held-out part of a record may leave the fitted drive range, as a fraction of that range;
 farther out, every model is a guess."""
 
+STEP_DIGITS = 6
+"""Digits of the records' sample time in the parameter file: times written in decimals differ beyond."""
+
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
@@ -207,7 +210,8 @@ def identify(
     with parallel.one_thread():
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
-    parameters = _parameters(name, units, drive, fitted, offset, compared[0])
+    step = next((rounded(record.sample_time, STEP_DIGITS) for record in fit_records if record.timed), None)
+    parameters = _parameters(name, units, step, drive, fitted, offset, compared[0])
     said = verdict.verdict(errors, held_errors, quality.wrong_way(fitted), (units or {}).get("output", ""))
     if strict and said.useless:
         raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")
@@ -466,6 +470,7 @@ def _parted(item: Course) -> tuple[Course, Course]:
 def _parameters(
     name: str,
     units: Mapping[str, str] | None,
+    step: float | None,
     drive: tuple[float, float],
     fitted: FittedModel,
     offset: float,
@@ -477,6 +482,8 @@ def _parameters(
     content: dict[str, object] = {"hystgen": 1, "name": name}
     if units:
         content["units"] = dict(units)
+    if step is not None:
+        content["recorded_at"] = step
     content["input_range"] = list(drive)
     described: dict[str, object] = {
         "pi": {

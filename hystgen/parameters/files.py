@@ -148,7 +148,7 @@ def canonical_json(parameters: Parameters) -> str:
 
     A density appears as given, not as the plays made from it. Keys added later (`emit.optimize`, `emit.compensation`,
     `not_separable` and some in effects) appear only if they differ from the default, so that files without them keep
-    their hash.
+    their hash; `recorded_at`, which changes nothing, never does.
     """
     data = _data(parameters)
     if parameters.emit.optimize == "auto":
@@ -159,6 +159,7 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["compensation"]["compensate"]
     if not parameters.not_separable:
         del data["not_separable"]
+    del data["recorded_at"]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
