@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import arguments
 from hystgen.compensator.chain.layout import LEAST_LATE
 from hystgen.identification import instruments
-from hystgen.identification.prepared import samples_in
+from hystgen.identification.prepared import about_skip, samples_in
 from hystgen.model import Model
-from hystgen.records import in_units
+from hystgen.records import SHORTEST, in_units
 from hystgen.simulation import simulate_records
 
 if TYPE_CHECKING:
@@ -143,6 +144,14 @@ def track(
         raise ValueError("tracking needs the measured motion: a column y in every record")
     given, records = records, instruments.put_right(in_units(records, model.parameters.units), clock_skew)
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
+    for record in records:
+        if len(record) < samples_in(record, skip) + SHORTEST:
+            raise ValueError(
+                f"{record.name} has {len(record)} samples, of which {min(samples_in(record, skip), len(record))} are to "
+                f"be skipped, but at least {SHORTEST} are needed; skip less, or record more"
+            )
+    notes += [text for record in records for text in about_skip(record, samples_in(record, skip))]
+    notes += arguments.outside("history", history, model.cascade.input_range, "the model's input_range")
     model.inverse()
     compensators = {PLAYS: model.without(model.effects), WHOLE: model}
     runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]

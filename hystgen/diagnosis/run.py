@@ -29,6 +29,7 @@ from hystgen.identification import P0_FLOOR, STEP_DIGITS, auto, instruments, qua
 from hystgen.identification.fit import visited
 from hystgen.identification.joint import Kept
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
+from hystgen.identification.prepared import about_skip, samples_in
 from hystgen.records import Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
@@ -127,6 +128,8 @@ def diagnose(
             _inverse(extended, made),
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
+    notes += arguments.outside("history", before or (), model.cascade.input_range, "the model's input_range")
+    notes += [text for each in read for text in about_skip(each, samples_in(each, skip))]
     notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += [*done.cleaned.notes(unit), *done.notes, *by_itself]
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))

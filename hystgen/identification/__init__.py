@@ -203,6 +203,9 @@ def identify(
         for item in compared
         if item.used < SHORTEST
     ]
+    seen = [record.v for record in (*fit_records, *held_records)]
+    ends = min(float(v.min()) for v in seen), max(float(v.max()) for v in seen)
+    reported += arguments.outside("history", before or (), ends, "the drive of all records")
     if not loading_curve:  # every sample of a loading curve depends on the start
         largest = float(fitted.solution.thresholds[-1])
         reported += [text for each in errors if (text := quality.about_start(each, largest))]

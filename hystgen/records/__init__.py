@@ -33,6 +33,7 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
 from hystgen.records.tdms import read_tdms
+from hystgen.records.told import time_without_unit
 from hystgen.records.units import converted, wanted
 from hystgen.records.writing import columns_text, write_columns
 
@@ -85,6 +86,7 @@ def read_records(
     unnamed = [k for k, source in enumerate(everything) if not isinstance(source, Record | str | os.PathLike)]
     refused: list[str] = []
     ways: dict[str, list[str]] = {}
+    kept = [source for source in everything if isinstance(source, Record)]
     with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
         for k, source in enumerate(everything):
             try:
@@ -106,6 +108,8 @@ def read_records(
         for way, names in ways.items():
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             console.note(f"read as: {', '.join(names[:LISTED])}{more}: {way}")
+        if said := time_without_unit([each for each in found if not any(each is own for own in kept)], sample_time):
+            console.note(f"warning: {said}")
     if refused:
         raise RecordError(refused)
     return found
