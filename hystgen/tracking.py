@@ -137,8 +137,8 @@ def track(
     model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive. `straight
     line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
     without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
-    `rest` come before every record; `skip`: seconds at the start of each record that are not compared; `clock_skew`: as for `identify`. Raises
-    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
+    `rest` come before every record; `skip`: seconds at the start of each record that are not compared; `clock_skew`: as
+    for `identify`. Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
@@ -147,8 +147,8 @@ def track(
     for record in records:
         if len(record) < samples_in(record, skip) + SHORTEST:
             raise ValueError(
-                f"{record.name} has {len(record)} samples, of which {min(samples_in(record, skip), len(record))} are to "
-                f"be skipped, but at least {SHORTEST} are needed; skip less, or record more"
+                f"{record.name} has {len(record)} samples, of which {min(samples_in(record, skip), len(record))} are "
+                f"to be skipped, but at least {SHORTEST} are needed; skip less, or record more"
             )
     notes += [text for record in records for text in about_skip(record, samples_in(record, skip))]
     notes += arguments.outside("history", history, model.cascade.input_range, "the model's input_range")

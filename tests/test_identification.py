@@ -696,7 +696,10 @@ class TestRefused:
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
                 "the sign of y, otherwise check which column is which",
             ),
-            (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, of which 390 are to be skipped, but at least 16 are needed; skip less, or record more"),
+            (
+                SINE, SINE, ("--skip", "0.39"),
+                "data.csv has 400 samples, of which 390 are to be skipped, but at least 16 are needed; skip less",
+            ),
             (
                 SINE[:60],
                 SINE[:60],

@@ -5,14 +5,12 @@ The actuators here are simulated in plain Python, without code of the package.""
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import hystgen
-from hystgen.identification import lasting
+from hystgen.identification import clocks, instruments, lasting
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -33,7 +31,8 @@ def actuator(v: Array, thresholds: int = 12, start: float = 0.0) -> Array:
 
 
 def triangle(samples: int, periods: float) -> Array:
-    return np.asarray(50.0 - 50.0 * np.cos(np.pi * np.abs(2.0 * ((np.arange(samples) / samples * periods) % 1.0) - 1.0)))
+    phase = (np.arange(samples) / samples * periods) % 1.0
+    return np.asarray(50.0 - 50.0 * np.cos(np.pi * np.abs(2.0 * phase - 1.0)))
 
 
 def swept(samples: int) -> Array:
@@ -67,7 +66,8 @@ def test_a_slip_of_fringes_is_found_with_sample_and_size(drive: str, steps: dict
     v = DRIVES[drive]
     y = actuator(v)
     found = lasting.steps(record(v, stepped(y, **steps), noise=0.01))
-    assert found is not None and found.modulus is None
+    assert found is not None
+    assert found.modulus is None
     assert found.at.tolist() == [int(place[1:]) for place in steps]
     np.testing.assert_allclose(found.sizes, list(steps.values()), atol=0.03)  # three deviations of the noise
 
@@ -83,7 +83,8 @@ def test_a_counter_that_wraps_is_unwrapped(drive: str, bits: int, scale: float, 
         counted, modulus = np.mod(np.rint(y * scale), 2.0**bits), 2.0**bits
     assert np.max(np.abs(np.diff(counted))) > 0.9 * modulus
     found = lasting.steps(record(v, counted))
-    assert found is not None and found.modulus == pytest.approx(modulus, rel=1e-3)
+    assert found is not None
+    assert found.modulus == pytest.approx(modulus, rel=1e-3)
     moved = found.bridged(counted)
     np.testing.assert_allclose(np.diff(moved), np.diff(y * scale), atol=1.5 if scale != 1.0 else 1e-2)
 
@@ -148,3 +149,74 @@ SOUND: dict[str, Callable[[], tuple[Array, Array]]] = {
 def test_what_the_actuator_or_a_lesser_fault_does_is_no_lasting_step(what: str, noise: float) -> None:
     v, y = SOUND[what]()
     assert lasting.steps(record(v, y, noise)) is None
+
+
+# Clocks that differ --------------------------------------------------------------------------------------------
+
+SECONDS = np.arange(5000) * 0.004
+WAVES: dict[str, Callable[[Array], Array]] = {
+    "sine": lambda t: 50.0 - 50.0 * np.cos(2.0 * np.pi * t),
+    "triangle": lambda t: 100.0 * np.abs(2.0 * ((0.7 * t) % 1.0) - 1.0),
+    "two sines": lambda t: 50.0 + 30.0 * np.sin(3.3 * t) + 20.0 * np.sin(10.7 * t + 1.0),
+    "sweep": lambda t: 50.0 - 50.0 * np.cos(2.0 * np.pi * (0.2 * t + 0.05 * t**2)),
+}
+
+
+def on_clocks(
+    wave: str, ppm: float, change: Callable[[Array, Array], Array] = lambda t, y: y, lag: float = 0.0
+) -> Record:
+    """A record whose sensor is late by `ppm` us for each second, and by `lag` s from the beginning."""
+    drive = WAVES[wave]
+    late = SECONDS * (1.0 - 1e-6 * ppm) - lag
+    y = change(SECONDS, actuator(drive(np.maximum(late, 0.0))))
+    y = y + 0.01 * np.random.default_rng(5).standard_normal(len(y))
+    return Record("r.csv", SECONDS, drive(SECONDS), y, sample_time=0.004)
+
+
+@pytest.mark.parametrize(("wave", "ppm"), [
+    ("sine", 50.0), ("sine", -300.0), ("sine", 2000.0), ("triangle", 200.0), ("two sines", 50.0), ("two sines", -1000.0),
+    ("sweep", 300.0), ("sweep", 2000.0),
+])  # fmt: skip
+def test_the_skew_of_two_clocks_is_estimated(wave: str, ppm: float) -> None:
+    found = clocks.skew(on_clocks(wave, ppm, lag=0.006))
+    assert found is not None
+    assert abs(1e6 * found.slope - ppm) < max(2.0 * 1e6 * found.half, 0.015 * abs(ppm))
+    assert 1e6 * found.half < 30.0
+
+
+def creeping(t: Array, y: Array) -> Array:
+    slow = [lagging(y, 0.004 / seconds) - y for seconds in (0.3, 3.0, 30.0)]
+    return np.asarray(y + 0.02 * slow[0] + 0.02 * slow[1] + 0.03 * slow[2])
+
+
+CHANGES: dict[str, Callable[[Array, Array], Array]] = {
+    "nothing": lambda t, y: y,
+    "creep": creeping,
+    "ageing": lambda t, y: y * (1.0 + 0.03 * t / t[-1]),
+    "warming": lambda t, y: y * (1.0 + 0.02 * (1.0 - np.exp(-0.2 * t))) + 0.3 * (1.0 - np.exp(-0.2 * t)),
+    "a sensor's lag": lambda t, y: lagging(y, 0.3),
+}
+
+
+@pytest.mark.parametrize("wave", WAVES)
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_lag_creep_and_ageing_are_no_skew(wave: str, change: str) -> None:
+    assert clocks.skew(on_clocks(wave, 0.0, CHANGES[change], lag=0.02)) is None
+
+
+def test_a_skew_is_told_and_taken_out_where_asked() -> None:
+    skewed, plain = on_clocks("two sines", 1000.0), on_clocks("two sines", 0.0)
+    (told,) = instruments.put_right([skewed])
+    assert told.y is skewed.y
+    (note,) = told.notes
+    assert "the clocks of drive and sensor differ by" in note
+    assert "--clock-skew auto" in note
+    for asked in ("auto", 1000.0):
+        (right,) = instruments.put_right([skewed], asked)
+        lost = len(plain) - len(right)
+        assert 0 < lost <= 1 + 0.001 * 20.0 / 0.004
+        assert f"taken out, with the last {lost} samples" in right.notes[-1]
+        assert right.y is not None
+        assert plain.y is not None
+        assert np.std(right.y - plain.y[: len(right)]) < 0.02  # the noise of both, and the estimate's
+        assert clocks.skew(right) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -89,7 +90,8 @@ def diagnose(
     if plan:
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
-            "--clock-skew": clock_skew, "--session": session, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
+            "--clock-skew": clock_skew, "--session": session, "--columns": reading["columns"],
+            "--delimiter": reading["delimiter"],
         }
         given = [option for option, value in unused.items() if value]
         if given:
@@ -128,7 +130,8 @@ def diagnose(
     common.keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
     common.guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = common.history_values(history)
-    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip, "clock_skew": clock_skew}
+    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip}
+    how["clock_skew"] = clock_skew
     read_as = common.reading_options(**reading)
 
     def run() -> None:
@@ -146,6 +149,9 @@ def diagnose(
         console.say(found.sentence())
         if found.not_emitted():
             console.note(found.not_emitted())
+        step, command = found.next_step()
+        named = command.replace("params.yaml", shlex.quote(str(Path(output) / "params.yaml")))
+        console.say(f"Your next step: {step}:\n    {named}\n")
         for path in found.write(output):
             console.say(str(path))
 

@@ -53,8 +53,8 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: float, clock_skew: float | str | None, loading_curve: bool, name: str | None,
-    units: dict[str, str] | None, strict: bool, plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
-    jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
+    units: dict[str, str] | None, strict: bool, plot: str | None, report: str | None, history: str | None, rest: float,
+    batch: tuple[str, ...], emit: bool | None, jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
 

@@ -119,7 +119,7 @@ def identify(
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
       part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
-    - `clock_skew`: growth of the delay of y after v that is taken out of every record, in ppm of time, because drive and
+    - `clock_skew`: growth of the delay of y after v, in ppm of time, to take out of every record, because drive and
       sensor were sampled with clocks of their own; `auto`: that of each record, where it is significant. By default it
       is only reported.
     - `strict`: raise UselessError where the figures say that the model is of no use (`Fit.verdict`).
@@ -312,7 +312,8 @@ def _choose(tried: Sequence[_Tried]) -> int:
     if any(plain) and not all(plain):
         noise = quality.noise_of([each.course for each in tried[plain.index(True)].errors])
         best = min(rms for rms, alone in zip(found, plain, strict=True) if alone)
-        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if best > verdict.ABOVE_NOISE * noise else 0.0
+        above = best > verdict.ABOVE_NOISE * noise
+        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if above else 0.0
         found = [rms if alone or rms <= most else math.inf for rms, alone in zip(found, plain, strict=True)]
     enough = MODEL_PARSIMONY * min(found)
     return next(k for k, rms in enumerate(found) if rms <= enough)

@@ -1,7 +1,7 @@
 """Drive and sensor on clocks of their own: the delay between them grows evenly along the record.
 
-A delay adds `-d y'` to the output. In a fit of plays, whose weights may drift, the record's sections each get a delay of
-their own; on clocks that differ by a skew s, these lie on a straight line over time with the slope s. A lag of the
+A delay d adds `-d y'` to the output. In a fit of plays, whose weights may drift, the record's sections each get a delay
+of their own; on clocks that differ by a skew s, these lie on a straight line over time with the slope s. A lag of the
 sensor has no slope; creep, ageing and warming move weights and offsets rather than delays, and slow down; and what
 depends on the speed or the amplitude of the drive goes with these, which the line is told apart from.
 """
@@ -38,8 +38,8 @@ MOST = 100_000
 """[samples] A longer record is thinned evenly to about this many."""
 
 SUSPECT, SURE, UNLIKE_SURE = 3.0, 6.0, 12.0
-"""[standard deviations] A skew is looked at closely, and told, above these; with 10 degrees of freedom, chance exceeds 6
-in one of 8000 records. If the drive's speed or amplitude changes along the record, an ageing actuator behind a lag
+"""[standard deviations] A skew is looked at closely, and told, above these; with 10 degrees of freedom, chance exceeds
+6 in one of 8000 records. If the drive's speed or amplitude changes along the record, an ageing actuator behind a lag
 reaches 6.8, and one whose loop widens by half 11: there, twice that is asked for."""
 
 STRAIGHT = 0.9
@@ -141,7 +141,9 @@ def skew(record: Record) -> Skew | None:
     slope, found = whole
     line = abs(slope) * float(np.std(found.times))
     sure = UNLIKE_SURE if found.unlike else SURE
-    if found.explained < EXPLAINED or abs(slope) < sure * found.deviation or found.excess**2 > (1.0 - STRAIGHT) * line**2:
+    if found.explained < EXPLAINED or abs(slope) < sure * found.deviation:
+        return None
+    if found.excess**2 > (1.0 - STRAIGHT) * line**2:
         return None
     return Skew(slope, 1.96 * found.deviation)
 
@@ -229,7 +231,8 @@ def _growth(t: Array, v: Array, y: Array, most: int) -> _Growth | None:
     deviation = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0] * max(spread, 1.0)))
     usual = float(np.mean(np.diag(covariance)))
     excess = float(np.sqrt(max(spread - 1.0, 0.0) * usual))
-    return _Growth(float(line[0]), deviation, excess, times, table.shape[1] > 2, 1.0 - float(np.var(left) / np.var(y[some])))
+    explained = 1.0 - float(np.var(left) / np.var(y[some]))
+    return _Growth(float(line[0]), deviation, excess, times, table.shape[1] > 2, explained)
 
 
 def _unlike(t: Array, v: Array, section: NDArray[np.intp]) -> list[Array]:

@@ -46,8 +46,8 @@ ALONG = 0.9
 """More than this fraction of the actuator's own jumps go with the drive, up and down."""
 
 NEARBY, RECURS = 0.1, 0.25
-"""[fraction of the drive's range] Its own jumps recur within this of each other, in more than a quarter of the passes of
-the drive: some stay out where a smaller loop does not undo the jump before."""
+"""[fraction of the drive's range] Its own jumps recur within this of each other, in more than a quarter of the drive's
+passes: some stay out where a smaller loop does not undo the jump before."""
 
 MOST = 50
 """Largest number of steps in a record; more belong to the actuator, or to a sensor of no use."""
@@ -214,7 +214,7 @@ def _its_own(at: Indices, v: Array, y: Array, move: Array) -> bool:
     for k, here in enumerate(at.tolist()):
         alike = (signs == signs[k]) & (np.abs(v[at] - v[here]) < NEARBY * float(np.ptp(v)))
         above = v > v[here] if drive[k] > 0.0 else v < v[here]
-        often.append(np.count_nonzero(alike) / max(np.count_nonzero(above[1:] & ~above[:-1]), 1))
+        often.append(int(np.count_nonzero(alike)) / max(int(np.count_nonzero(above[1:] & ~above[:-1])), 1))
     return float(np.mean(often)) > RECURS
 
 
@@ -242,7 +242,7 @@ def _sudden(v: Array, y: Array, move: Array) -> Indices:
     at = some[sudden]
     # where the drive's rate jumps, what depends on it does too, as the voltage of a cell whose current turns
     ahead, behind = (_median(drive, at[:, None] + side) for side in (np.arange(-AROUND, 0), np.arange(1, AROUND + 1)))
-    return at[np.abs(behind - ahead) < RATE * float(np.quantile(np.abs(drive), USUAL))]
+    return np.asarray(at[np.abs(behind - ahead) < RATE * float(np.quantile(np.abs(drive), USUAL))])
 
 
 def _without_returns(at: Indices, move: Array, samples: int) -> Indices:
@@ -283,7 +283,7 @@ class _Whole:
         with parallel.one_thread():
             weights, *_ = np.linalg.lstsq(table[:, some].T, y[some], rcond=pi.SENSED_RANK)
         errors = y[some] - weights @ table[:, some]
-        return cls(weights[len(table) - len(at) :], float(np.sqrt(np.mean(errors**2))))
+        return cls(np.asarray(weights[len(table) - len(at) :], dtype=np.float64), float(np.sqrt(np.mean(errors**2))))
 
 
 def _sizes(v: Array, y: Array, at: Indices) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -78,7 +79,8 @@ def verdict(
     left, noise = _rms([each.error for each in judged]), _noise(judged)
     u, of = f" {unit}" if unit else "", "held-out samples" if held else "the records"
     times = max(quality.correlation_time(e[np.isfinite(e)]) for e in (each.error for each in judged))
-    least = max((COLOURED if times < SHORT else ABOVE_NOISE) * noise, faults.LITTLE * max(each.course.output_range for each in judged))
+    little = faults.LITTLE * max(each.course.output_range for each in judged)
+    least = max((COLOURED if times < SHORT else ABOVE_NOISE) * noise, little)
     line, share = _line(own, judged), max(_explained(own), _explained(judged))
     off = f"on {of} the model is off by {left:.3g}{u} rms"
     if wrong_way:
@@ -95,7 +97,7 @@ def verdict(
         return Verdict("missing", f"{off}, {above} the noise")
     if not held:
         return Verdict("untold", "nothing was held out, so the error on other records is unknown")
-    if line <= least and noise > faults.LITTLE * max(each.course.output_range for each in judged):
+    if line <= least and noise > little:
         return Verdict("untold", f"a straight line is off by {line:.3g}{u} rms, mere noise: no hysteresis shows")
     return Verdict("good", f"{off}, which is noise")
 
@@ -119,9 +121,9 @@ def _noise(judged: Sequence[FreeRunErrors]) -> float:
     for signals in ([each.error for each in judged], [each.course.y[each.course.compared] for each in judged]):
         known = [x[np.isfinite(x)] for x in signals]
         squares = [(faults.white_noise(x) ** 2, len(x)) for x in known if len(x) > 3]
-        found.append(np.sqrt(sum(s * n for s, n in squares) / max(sum(n for _, n in squares), 1)))
+        found.append(math.sqrt(sum(s * n for s, n in squares) / max(sum(n for _, n in squares), 1)))
     grains = [_grain(each.course) for each in judged]
-    return max(float(min(found)), min(grains, default=0.0) / np.sqrt(12.0))
+    return max(min(found), min(grains, default=0.0) / math.sqrt(12.0))
 
 
 def _grain(item: Course) -> float:

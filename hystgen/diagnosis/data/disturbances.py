@@ -316,7 +316,7 @@ def _ripple(
 
 
 def _quantised(y: Array, pitch: float) -> bool:
-    """Whether a pitch is the converter's step or a whole fraction of it: that is the resolution, and counts as noise."""
+    """Whether a pitch is the converter's step or a whole fraction of it, which is resolution, not ripple."""
     parts = converter_step(y) / pitch
     return bool(np.isfinite(parts) and parts > 0.5 and abs(parts / round(parts) - 1.0) < acceptance.CONVERTER_STEP)
 

@@ -114,6 +114,10 @@ WRITTEN = {
 """Descriptions of the model in `params.yaml`."""
 
 
+EXPLAINED_IN = "docs/plants.md explains it"
+"""Where hysteresis that is no play sum is described."""
+
+
 @dataclass(frozen=True)
 class NamedEffect:
     """An effect that was found: `parameters` as in a parameter file, with 95 % `intervals`.
@@ -265,7 +269,7 @@ class Diagnosis:
 
     def sentence(self) -> str:
         """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
-        parts = [capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
+        parts = [f"{capital(each.sentence(self.result.unit))} ({EXPLAINED_IN})" for each in self._of_another_kind()]
         parts += [*self._limits(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
             parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
@@ -273,6 +277,17 @@ class Diagnosis:
         if wrong:
             parts.append(f"The data have faults: {wrong}")
         return " ".join(f"{part}." for part in parts)
+
+    def next_step(self) -> tuple[str, str]:
+        """The next step, and its command."""
+        if self._of_another_kind() and not self.result.effects:
+            fit = "hystgen identify RECORDS --model auto -o auto.yaml"
+            return "fit elements whose minor loops stay open, which auto tries", fit
+        if self._limits() or (self.verdict == "unexplained" and not self.result.effects):
+            return "record drives in which every effect shows", "hystgen diagnose --plan params.yaml -o plan/"
+        if self.not_emitted():
+            return "see the tracking error with the model", "hystgen track params.yaml RECORDS"
+        return "write the compensator as C", "hystgen emit params.yaml -o firmware/"
 
     def uncertain(self) -> list[str]:
         """Parameters at an end of their range, and effects with two parts that coincide."""
