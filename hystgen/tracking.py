@@ -138,7 +138,8 @@ def track(
     line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
     without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
     `rest` come before every record; `skip`: seconds at the start of each record that are not compared; `clock_skew`: as
-    for `identify`. Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
+    for `identify`. Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for
+    incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")

@@ -54,7 +54,8 @@ def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: float, clock_skew: float | str | None, loading_curve: bool, name: str | None,
     units: dict[str, str] | None, strict: bool, plot: str | None, report: str | None, history: str | None, rest: float,
-    batch: tuple[str, ...], emit: bool | None, jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
+    batch: tuple[str, ...], emit: bool | None, jobs: int | None, scheduler: str | None,
+    **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
 
