@@ -220,7 +220,7 @@ def test_the_package_itself_imports_nothing() -> None:
         ("a recording's column v to weights", 33),  # 4 of these files look for faults of instruments and judge the fit
         ("a weight to its digit in float32 C", 28),  # 3 of these files explain the C, one declares memory by name
         ("a sample through the bit-exact reference", 6),  # one of these files runs the calls of every engine
-        ("a recording to a named effect", 73),  # 8 put the inverse in front of the plain model, 3 see instruments' faults
+        ("a recording to a named effect", 73),  # 8 put the inverse before the plain model, 3 see instruments' faults
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:
