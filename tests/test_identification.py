@@ -699,7 +699,8 @@ class TestRefused:
             ),
             (
                 SINE, SINE, ("--skip", "0.39"),
-                "data.csv has 400 samples, of which 390 are to be skipped, but at least 16 are needed; skip less, or record more",
+                "data.csv has 400 samples, of which 390 are to be skipped, but at least 16 are needed; skip less, or "
+                "record more",
             ),
             (
                 SINE[:60],
