@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
-from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
+from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted, duration
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, remarks, tables
 from hystgen.compensator.reference import Session
@@ -153,9 +153,12 @@ class Model:
             return
         names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
+            step = self.parameters.recorded_at
+            own = "SECONDS" if step is None else f"{step:.4g}"
+            whose = "" if step is None else f" (recorded at {duration(step)})"
             raise EffectsError(
                 f"C for a model with effects ({names}) needs sample_time in the parameter file; add "
-                "`sample_time: 1.0e-4`, the time in s between two calls of step"
+                f"`sample_time: {own}`{whose}, the time in s between two calls of step"
             )
         if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import display
+from hystgen.basics import arguments, display
 from hystgen.basics.problems import counted
 from hystgen.compensator.chain.layout import LEAST_LATE
-from hystgen.identification.prepared import samples_in
+from hystgen.identification import instruments
+from hystgen.identification.prepared import about_skip, samples_in
 from hystgen.model import Model
-from hystgen.records import in_units
+from hystgen.records import SHORTEST, in_units
 from hystgen.simulation import simulate_records
 
 if TYPE_CHECKING:
@@ -140,7 +141,8 @@ def late(model: Model, records: Sequence[Record]) -> str:
 
 
 def track(
-    model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0
+    model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0,
+    clock_skew: float | str | None = None,
 ) -> Tracking:
     """The tracking error with each compensator if the records' motions were the references.
 
@@ -148,13 +150,22 @@ def track(
     model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive. `straight
     line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of `model`
     without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`. `history` and
-    `rest` come before every record; `skip`: seconds at the start of each record that are not compared. Raises
-    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for incompatible units.
+    `rest` come before every record; `skip`: seconds at the start of each record that are not compared; `clock_skew`: as
+    for `identify`. Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for
+    incompatible units.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
-    given, records = records, in_units(records, model.parameters.units)
+    given, records = records, instruments.put_right(in_units(records, model.parameters.units), clock_skew)
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
+    for record in records:
+        if len(record) < samples_in(record, skip) + SHORTEST:
+            raise ValueError(
+                f"{record.name} has {len(record)} samples, of which {min(samples_in(record, skip), len(record))} are "
+                f"to be skipped, but at least {SHORTEST} are needed; skip less, or record more"
+            )
+    notes += [text for record in records for text in about_skip(record, samples_in(record, skip))]
+    notes += arguments.outside("history", history, model.cascade.input_range, "the model's input_range")
     model.inverse()
     compensators = {PLAYS: model.without(model.effects), WHOLE: model}
     runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]

@@ -1359,7 +1359,7 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
         assert (code, said) == (2, "")
         assert err == (
             "error: C for a model with effects (lag, slew_limit) needs sample_time in the parameter file; add "
-            "`sample_time: 1.0e-4`, the time in s between two calls of step"
+            "`sample_time: SECONDS`, the time in s between two calls of step"
         )
         assert not out.exists()
     moved = "    - {name: rate_dependence, shape: relaxation, time_constant: 0.1}\nsample_time: 1.0e-3\n"

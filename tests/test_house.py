@@ -221,10 +221,10 @@ def test_the_package_itself_imports_nothing() -> None:
 @pytest.mark.parametrize(
     ("walk", "most"),
     [
-        ("a recording's column v to weights", 32),  # 3 of these files choose the reader, by content
+        ("a recording's column v to weights", 36),  # 3 choose the reader, by content, 4 look for faults of instruments
         ("a weight to its digit in float32 C", 28),  # 3 of these files explain the C, one declares memory by name
         ("a sample through the bit-exact reference", 6),  # one of these files runs the calls of every engine
-        ("a recording to a named effect", 72),  # 8 of these files put the inverse in front of the plain model
+        ("a recording to a named effect", 75),  # 8 put the inverse before the plain model, 3 see instruments' faults
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:

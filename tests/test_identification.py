@@ -408,7 +408,8 @@ class TestStartMemory:
         y = noisy(brute_output(v, THRESHOLDS, WEIGHTS, brute_plays([-100.0], THRESHOLDS, 0.0)[-1]), 0.001)
         right = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=(-100.0,))
         wrong = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=(150.0,))
-        assert not any("history" in text for text in right.warnings)
+        assert not any("the history may be wrong" in text for text in right.warnings)
+        assert any(text.startswith("history goes to -100, outside the drive of all") for text in right.warnings)
         assert any("the history may be wrong" in text for text in wrong.warnings)
 
     @pytest.mark.parametrize("start", [-38.0, 0.0, 25.0])
@@ -615,7 +616,7 @@ class TestWritten:
         assert code == 0, err
         assert out.splitlines()[-1] == str(target)
         content = written(target)
-        assert list(content) == ["hystgen", "name", "units", "input_range", "model"]
+        assert list(content) == ["hystgen", "name", "units", "recorded_at", "input_range", "model"]
         assert content["name"] == "axis_1"
         assert content["units"] == {"input": "V", "output": "um"}
         assert list(content["model"]) == ["pi", "output_offset"]
@@ -696,7 +697,11 @@ class TestRefused:
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
                 "the sign of y, otherwise check which column is which",
             ),
-            (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, but at least 406 are needed"),
+            (
+                SINE, SINE, ("--skip", "0.39"),
+                "data.csv has 400 samples, of which 390 are to be skipped, but at least 16 are needed; skip less, or "
+                "record more",
+            ),
             (
                 SINE[:60],
                 SINE[:60],

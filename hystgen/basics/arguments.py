@@ -236,3 +236,19 @@ def finite_numbers(values: Sequence[float], name: str) -> tuple[float, ...]:
     if not found or not all(map(math.isfinite, found)):
         raise ValueError(f"give {name} as finite numbers, at least one")
     return found
+
+
+FAR_OUT = 0.1
+"""[fraction of a drive range] Drives farther outside than this are outside on purpose, or in another unit."""
+
+
+def outside(name: str, drives: Sequence[float], allowed: tuple[float, float], whose: str) -> list[str]:
+    """A warning if some of the drives in an argument lie far outside a range; `whose`: what the range belongs to."""
+    low, high = allowed
+    far = [drive for drive in drives if not low - FAR_OUT * (high - low) <= drive <= high + FAR_OUT * (high - low)]
+    if not far:
+        return []
+    return [
+        f"{name} goes to {max(far, key=lambda drive: abs(drive - (low + high) / 2.0)):.6g}, outside {whose}, {low:.6g} "
+        f"to {high:.6g}: what the plays do there is not known; is it in the drive's unit?"
+    ]

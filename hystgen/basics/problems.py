@@ -140,6 +140,17 @@ def counted(number: int, one: str, several: str = "") -> str:
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
+def capital(text: str) -> str:
+    """The text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]
+
+
+def duration(time: float) -> str:
+    """A time with the prefix that suits it, as in `5 ms`."""
+    size, unit = next(((x, u) for x, u in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")) if time >= x), (1e-9, "ns"))
+    return f"{time / size:.4g} {unit}"
+
+
 FACTOR = 10.0
 """[times] Ratios from this value on are worded as factors: "32 times" is easier to read than "3200 %", which has more
 than the three digits shown. Only wording depends on it. Changed by:

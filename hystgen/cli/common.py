@@ -151,6 +151,21 @@ skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
     help="seconds at the start of every record to leave out of the comparison; their drive still counts",
 )
+def _skew(_context: click.Context, _option: click.Parameter, value: str | None) -> float | str | None:
+    if value is None or value == "auto":
+        return value
+    try:
+        return float(value)
+    except ValueError:
+        raise click.BadParameter(f"'{value}' is neither a number of ppm nor auto") from None
+
+
+skew_option = click.option(
+    "--clock-skew", metavar="PPM|auto", callback=_skew,
+    help="take out a delay of y after v that grows by this many us per s, as clocks of their own cause; auto: as found",
+)
+
+
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
     """The results of `action` for all items. Raises Failed with all messages and the highest of the exit codes."""
     made, failures = [], []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -70,10 +71,12 @@ def _names(_context: click.Context, _option: click.Parameter, value: str | None)
 @common.effects_option
 @common.record_options
 @common.skip_option
+@common.skew_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
     plan: bool, max_rate: float | None, rate: float | None, dac_bits: int | None, dac_range: str | None,
     dac_coding: str | None, session: str | None, known: tuple[str, ...], history: str | None, rest: float, skip: float,
+    clock_skew: float | str | None,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effects, and the model with them.
@@ -97,7 +100,8 @@ def diagnose(
     if plan:
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
-            "--session": session, "--with": known, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
+            "--clock-skew": clock_skew, "--session": session, "--with": known, "--columns": reading["columns"],
+            "--delimiter": reading["delimiter"],
         }
         given = [option for option, value in unused.items() if value]
         if given:
@@ -137,6 +141,7 @@ def diagnose(
     common.guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = common.history_values(history)
     how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip, "known": known}
+    how["clock_skew"] = clock_skew
     read_as = common.reading_options(**reading)
 
     def run() -> None:
@@ -154,6 +159,9 @@ def diagnose(
         console.say(found.sentence())
         if found.not_emitted():
             console.note(found.not_emitted())
+        step, command = found.next_step()
+        named = command.replace("params.yaml", shlex.quote(str(Path(output) / "params.yaml")))
+        console.say(f"Your next step: {step}:\n    {named}\n")
         for path in found.write(output):
             console.say(str(path))
 

@@ -10,7 +10,7 @@ from typing import Any, Unpack
 import click
 
 from hystgen.basics import console
-from hystgen.basics.problems import counted
+from hystgen.basics.problems import capital, counted
 from hystgen.cli import common
 
 
@@ -39,20 +39,23 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "'holdout/{unit}.csv'",
 )
 @common.skip_option
+@common.skew_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
     "--units", metavar="V,um", callback=_units,
     help="units of drive and output, to which records are converted; default: the records'",
 )
+@click.option("--strict", is_flag=True, help="exit with 1 where the figures say that the model is of no use")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @common.record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
-    plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
-    jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
+    holdout: tuple[str, ...], skip: float, clock_skew: float | str | None, loading_curve: bool, name: str | None,
+    units: dict[str, str] | None, strict: bool, plot: str | None, report: str | None, history: str | None, rest: float,
+    batch: tuple[str, ...], emit: bool | None, jobs: int | None, scheduler: str | None,
+    **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
 
@@ -73,6 +76,7 @@ def identify(
         "rest": rest,
         "units": units,
         "skip": skip,
+        "clock_skew": clock_skew,
         "loading_curve": loading_curve,
     }
     only_batch: dict[str, object] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
@@ -83,7 +87,7 @@ def identify(
         # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
-            **options, **how,
+            strict=strict, **options, **how,
         )
         return
     for option, given in only_batch.items():
@@ -130,12 +134,16 @@ def identify(
         fit = older.on(fit)
         fit.write(output)
         console.say(fit.table())
+        step, command = fit.verdict.next_step(output, data, holdout)
+        console.say(f"{capital(fit.verdict.why)}. Your next step: {step}:\n    {command}\n")
         console.say(output)
         if plot:
-            drawing.picture(lambda: plots.fit_figure(fit, read), plot)
+            drawing.picture(lambda: plots.fit_figure(fit, fit.records), plot)
             console.say(plot)
         if report:
-            console.say(str(pages.write(fit, read, report, Path(output).name)))
+            console.say(str(pages.write(fit, fit.records, report, Path(output).name)))
+        if strict and fit.verdict.useless:
+            raise common.Failed(f"error: {data[0]}: the model is of no use: {fit.verdict.why}", 1)
 
     common.guarded(data[0], run)
 

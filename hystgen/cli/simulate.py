@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 import click
 
 from hystgen.arithmetic import ARITHMETICS, FIXED
-from hystgen.basics import console
+from hystgen.basics import arguments, console
 from hystgen.cli import common
 
 if TYPE_CHECKING:
@@ -75,6 +75,9 @@ def simulate(
             raise common.Failed(f"error: {both}; rename one with --columns", 2)
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
+    ends = model.cascade.input_range
+    for note in arguments.outside("history", visited or (), ends, "the model's input_range"):
+        console.note(f"warning: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and len(data) > 1 and Path(output).is_file():
         raise common.Failed(f"error: {output} is a file, and several records need -o with a folder", 2)

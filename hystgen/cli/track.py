@@ -19,9 +19,11 @@ from hystgen.cli import common
 @common.effects_option
 @common.record_options
 @common.skip_option
+@common.skew_option
 def track(
     params: str, data: tuple[str, ...], plot: str | None, json_file: str | None, effects: tuple[str, ...],
-    history: str | None, rest: float, skip: float, **reading: Unpack[common.ReadingArguments],
+    history: str | None, rest: float, skip: float, clock_skew: float | str | None,
+    **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
 
@@ -47,7 +49,9 @@ def track(
     for record in read:
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
-    found = common.guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
+    found = common.guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip, clock_skew))
+    for note in found.notes:
+        console.note(f"warning: {note}")
     if note := tracking.late(model, read):
         console.note(f"warning: {note}")
     for each in found.records:

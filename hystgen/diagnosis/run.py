@@ -28,10 +28,11 @@ from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects import CATALOGUE, FRONTS
 from hystgen.effects.base import Effect, Place
-from hystgen.identification import P0_FLOOR, auto, quality, stage_content
+from hystgen.identification import P0_FLOOR, STEP_DIGITS, auto, instruments, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.joint import Kept
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
+from hystgen.identification.prepared import about_skip, samples_in
 from hystgen.records import Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def diagnose(
     columns: dict[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
+    clock_skew: float | str | None = None,
     progress: bool = False,
 ) -> Diagnosis:
     """Find the effects that a nominal model is missing.
@@ -72,7 +74,7 @@ def diagnose(
     `rest`: pause after the history in seconds. `skip`: seconds at the start of every record that are not compared,
     although their drive still moves the plays. `effects`: further effects to try; `known`: names of effects known to be
     there, which are fitted before the search and written whatever the records say, each with the judgement that the
-    search would have passed on it.
+    search would have passed on it. `clock_skew`: as for `identify`.
 
     The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
     weights so as to minimise the free-run error, and accepted if it removes a substantial part of the held-out error
@@ -102,6 +104,7 @@ def diagnose(
     known_effects.check(named, effects, there)
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     read = in_units(read, model.parameters.units, sources=[*fitted, *others])
+    read = instruments.put_right(read, clock_skew)
     nominal = _with_units(model.parameters, read)
     given, unit = nominal.model.effects, nominal.units.output
     before = None if history is None else visited(history)
@@ -141,15 +144,18 @@ def diagnose(
             _inverse(extended, made),
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
+    notes += arguments.outside("history", before or (), model.cascade.input_range, "the model's input_range")
+    notes += [text for each in read for text in about_skip(each, samples_in(each, skip))]
     notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += [*done.cleaned.notes(unit), *done.notes, *by_itself]
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
 
 
 def _with_units(parameters: Parameters, records: Sequence[Record]) -> Parameters:
-    """The parameters, with missing units taken from the records."""
+    """The parameters, with missing units taken from the records, and their sample time."""
     units, _ = agreed_units(records, parameters.units.model_dump())
-    return parameters.model_copy(update={"units": parameters.units.model_copy(update=units)})
+    step = next((rounded(record.sample_time, STEP_DIGITS) for record in records if record.timed), None)
+    return parameters.model_copy(update={"units": parameters.units.model_copy(update=units), "recorded_at": step})
 
 
 NO_FRONT = "the memoryless part of the model was left out: held-out records are predicted better without it"

@@ -24,12 +24,13 @@ from hystgen.effects import PARALLEL
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import elements, gpi, pi, prepared, quality, reduction
+from hystgen.identification import clocks, elements, gpi, instruments, pi, prepared, quality, reduction, verdict
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import ErrorRow
 from hystgen.identification.reduction import Course
+from hystgen.identification.verdict import UselessError
 from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
 
@@ -59,6 +60,9 @@ BEYOND = 0.1
 """Largest excursion by which a held-out part of a record may leave the fitted drive range, as a fraction of that range;
 farther out, every model is a guess."""
 
+STEP_DIGITS = 6
+"""Digits of the records' sample time in the parameter file: times written in decimals differ beyond."""
+
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
@@ -66,10 +70,6 @@ HALVED = 0.5
 """[fraction of the held-out error above the noise] `auto` takes elements in parallel with the plays only if they leave
 at most this of the best other model's error. Effects that are no such hysteresis leave more, of the whole error 0.78
 and more with several loops, 0.36 (ageing) with a single one. Set by: every eighth case of `make blind FIRST=97000`."""
-
-ABOVE_NOISE = 1.25
-"""[times the noise] `auto` takes them only if that error is larger than this, as a smaller one may be noise that is not
-white; the same limit as in a diagnosis. Set by: blind none."""
 
 
 @arguments.checked
@@ -90,6 +90,8 @@ def identify(
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
+    clock_skew: float | str | None = None,
+    strict: bool = False,
     progress: bool = False,
 ) -> Fit:
     """Fit a model to measured records.
@@ -117,6 +119,10 @@ def identify(
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
       part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
+    - `clock_skew`: growth of the delay of y after v, in ppm of time, to take out of every record, because drive and
+      sensor were sampled with clocks of their own; `auto`: that of each record, where it is significant. By default it
+      is only reported.
+    - `strict`: raise UselessError where the figures say that the model is of no use (`Fit.verdict`).
     - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
     The start memory in the parameter file is the memory after `history`. Without a history it is 0, as in a virgin
@@ -141,6 +147,7 @@ def identify(
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
     read = in_units(read, named=("units", units), sources=[*to_fit, *to_hold])
+    read = instruments.put_right(read, clock_skew)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
@@ -196,6 +203,9 @@ def identify(
         for item in compared
         if item.used < SHORTEST
     ]
+    seen = [record.v for record in (*fit_records, *held_records)]
+    ends = min(float(v.min()) for v in seen), max(float(v.max()) for v in seen)
+    reported += arguments.outside("history", before or (), ends, "the drive of all records")
     if not loading_curve:  # every sample of a loading curve depends on the start
         largest = float(fitted.solution.thresholds[-1])
         reported += [text for each in errors if (text := quality.about_start(each, largest))]
@@ -203,8 +213,12 @@ def identify(
     with parallel.one_thread():
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
-    parameters = _parameters(name, units, drive, fitted, offset, compared[0])
-    return Fit(parameters, tuple(rows), tuple(reported), sure, masks, before, tuple(read))
+    step = next((rounded(record.sample_time, STEP_DIGITS) for record in fit_records if record.timed), None)
+    parameters = _parameters(name, units, step, drive, fitted, offset, compared[0])
+    said = verdict.verdict(errors, held_errors, quality.wrong_way(fitted), (units or {}).get("output", ""))
+    if strict and said.useless:
+        raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")
+    return Fit(parameters, tuple(rows), tuple(reported), sure, masks, said, before, tuple(read))
 
 
 def check_options(
@@ -217,6 +231,7 @@ def check_options(
     p0_floor: float = P0_FLOOR,
     loading_curve: bool = False,
     units: Mapping[str, str] | None = None,
+    clock_skew: float | str | None = None,
     **_: object,
 ) -> tuple[gpi.How, tuple[float, ...] | None]:
     """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
@@ -230,6 +245,7 @@ def check_options(
         before = ()
     arguments.number("rest", rest, "seconds", 0.0)
     arguments.number("skip", skip, "seconds", 0.0)
+    clocks.checked(clock_skew)
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:
@@ -296,7 +312,8 @@ def _choose(tried: Sequence[_Tried]) -> int:
     if any(plain) and not all(plain):
         noise = quality.noise_of([each.course for each in tried[plain.index(True)].errors])
         best = min(rms for rms, alone in zip(found, plain, strict=True) if alone)
-        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if best > ABOVE_NOISE * noise else 0.0
+        above = best > verdict.ABOVE_NOISE * noise
+        most = math.hypot(HALVED * best, math.sqrt(1.0 - HALVED**2) * noise) if above else 0.0
         found = [rms if alone or rms <= most else math.inf for rms, alone in zip(found, plain, strict=True)]
     enough = MODEL_PARSIMONY * min(found)
     return next(k for k, rms in enumerate(found) if rms <= enough)
@@ -457,6 +474,7 @@ def _parted(item: Course) -> tuple[Course, Course]:
 def _parameters(
     name: str,
     units: Mapping[str, str] | None,
+    step: float | None,
     drive: tuple[float, float],
     fitted: FittedModel,
     offset: float,
@@ -468,6 +486,8 @@ def _parameters(
     content: dict[str, object] = {"hystgen": 1, "name": name}
     if units:
         content["units"] = dict(units)
+    if step is not None:
+        content["recorded_at"] = step
     content["input_range"] = list(drive)
     described: dict[str, object] = {
         "pi": {
@@ -524,6 +544,7 @@ __all__ = [
     "Fit",
     "IdentificationError",
     "Used",
+    "UselessError",
     "check_options",
     "identifier_from",
     "identify",

@@ -18,6 +18,7 @@ from hystgen.basics.problems import counted
 from hystgen.identification import elements, faults, joint, quality, reduction
 from hystgen.identification.quality import ErrorRow, Intervals, table
 from hystgen.identification.reduction import Course, StartMemory
+from hystgen.identification.verdict import Verdict
 from hystgen.records import Record, Source, in_units, read_record, write_atomically
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class Fit:
 
     `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: for the user, one sentence each;
     `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
+    `verdict`: what the figures say about the model, and the next step;
     `history`: drive values visited before each record, None if unknown; `records`: the records of `used`, in that
     order; `draw`: makes the figure of `plot`, None if there is nothing to draw.
     """
@@ -46,6 +48,7 @@ class Fit:
     warnings: tuple[str, ...]
     intervals: Intervals
     used: tuple[Used, ...]
+    verdict: Verdict
     history: tuple[float, ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False)
     draw: Callable[[Fit], Figure] | None = field(default=None, compare=False)

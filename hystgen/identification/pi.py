@@ -285,10 +285,10 @@ def turns_of(item: Course) -> Iterator[Turn]:
     """The turns of the drive of a course between its first and its last compared sample."""
     place = item.begin + np.flatnonzero(np.isfinite(item.y[item.begin : item.last]))
     v, y = item.v[place], item.y[place]
-    corners = _corners(v)
+    ends = corners(v)
     noise = white_noise(y) if len(y) > 3 else 0.0
-    legs = [_leg(v, y, place, a, b) for a, b in itertools.pairwise(corners)]
-    for before, after, corner in zip(legs[:-1], legs[1:], corners[1:-1], strict=True):
+    legs = [_leg(v, y, place, a, b) for a, b in itertools.pairwise(ends)]
+    for before, after, corner in zip(legs[:-1], legs[1:], ends[1:-1], strict=True):
         low, high = max(before[0][0], after[0][0]), min(before[0][-1], after[0][-1])
         if high - low < LEAST_TURN * float(np.ptp(v)):
             continue
@@ -301,7 +301,7 @@ def turns_of(item: Course) -> Iterator[Turn]:
             yield Turn(high - low, widths, mean, deviation)
 
 
-def _corners(v: Array) -> list[int]:
+def corners(v: Array) -> list[int]:
     """First sample, turning points and last sample of a drive's legs; fewer than three samples if there is no turn.
 
     A play with half of `LEAST_TURN` as threshold ignores smaller moves, and last moved where the drive turned.

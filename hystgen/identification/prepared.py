@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import counted
+from hystgen.basics.problems import counted, percent
 from hystgen.identification import faults, pi, start
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 
 LEAST_SOUND = 0.1
 """Smallest fraction of a record that must remain once the samples at the ends of a converter's range are removed."""
+
+MUCH_LESS = 0.5
+"""[fraction of the drive's range] If less than this is left behind a skipped start, a warning says so: plays need at
+least half the range to move out of any state."""
 
 MOST_FITS = 4
 """Maximum number of robust fits; they end as soon as a fit finds the same faults as the previous one."""
@@ -47,6 +51,7 @@ def courses(
     reported: list[str] = []
     for number, record in enumerate(records):
         skipped = samples_in(record, skip)
+        reported += about_skip(record, skipped)
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
             made.append(replace(course_of(record, history, skipped), origin=(number, 0)))
@@ -72,6 +77,15 @@ def courses(
     return made, reported
 
 
+def about_skip(record: Record, skipped: int) -> list[str]:
+    """A warning if little of the drive's range is left once the start is skipped."""
+    whole, left = float(np.ptp(record.v)), record.v[skipped:]
+    if not skipped or not len(left) or np.ptp(left) >= MUCH_LESS * whole:
+        return []
+    share = percent(float(np.ptp(left)) / whole)
+    return [f"{record.name}: once its start is skipped, the drive covers only {share} of its range; skip less"]
+
+
 def samples_in(record: Record, seconds: float) -> int:
     """Number of samples in the first seconds of a record."""
     return int(np.searchsorted(record.t, record.t[0] + seconds - 1e-6 * record.sample_time)) if seconds else 0
@@ -92,8 +106,10 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
     if not (np.isfinite(v).all() and np.isfinite(y).all()):
         raise IdentificationError(f"{record.name} has samples without a value; drop them first")
     if len(v) < skip + SHORTEST:
+        skipped = f", of which {min(skip, len(v))} are to be skipped" if skip else ""
         raise IdentificationError(
-            f"{record.name} has {counted(len(v), 'sample')}, but at least {skip + SHORTEST} are needed"
+            f"{record.name} has {counted(len(v), 'sample')}{skipped}, but at least {SHORTEST} are needed"
+            + ("; skip less, or record more" if skip else "")
         )
     for name, x in (("v", v), ("y", y)):
         missing = int(np.count_nonzero(no_value(x)))

@@ -332,6 +332,16 @@ def about_model(
     return reported
 
 
+def wrong_way(fitted: FittedModel) -> str:
+    """What is wrong with the direction of the output or its loops, as far as the model cannot follow it; else empty."""
+    sense = fitted.solution.sense
+    if sense.falls:
+        return "y falls when v rises, which the model cannot follow"
+    if sense.clockwise and fitted.parallel is None:
+        return "the loops run clockwise, which the model cannot follow: the columns may be exchanged"
+    return ""
+
+
 def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
     """Warnings about p_0, by which the inverse divides; `p` as written, `made` as fitted."""
     if made.free_p0 is not None and made.free_rms is not None:

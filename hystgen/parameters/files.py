@@ -147,8 +147,9 @@ def canonical_json(parameters: Parameters) -> str:
     """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
     A density appears as given, not as the plays made from it. `emit.output` is left out, since the C does not depend on
-    its folder. Keys added later (`emit.optimize`, `emit.compensation`, `emit.converter`, `not_separable` and some in
-    effects) appear only if they differ from the default, so that files without them keep their hash.
+    its folder, and `recorded_at`, which changes nothing. Keys added later (`emit.optimize`, `emit.compensation`,
+    `emit.converter`, `not_separable` and some in effects) appear only if they differ from the default, so that files
+    without them keep their hash.
     """
     data = _data(parameters)
     del data["emit"]["output"]
@@ -162,6 +163,7 @@ def canonical_json(parameters: Parameters) -> str:
         data["emit"].pop("converter", None)
     if not parameters.not_separable:
         del data["not_separable"]
+    del data["recorded_at"]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 

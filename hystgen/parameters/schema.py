@@ -329,6 +329,10 @@ class Parameters(_Part):
     sample_time: Positive | None = Field(
         default=None, description="period at which the emitted step is called, in seconds", examples=[5.0e-5]
     )
+    recorded_at: Positive | None = Field(
+        default=None, description="for information: sample time of the records behind the model, in seconds",
+        examples=[5.0e-3],
+    )
     input_range: tuple[Number, Number] = Field(
         description="lowest and highest drive the actuator may see, input units", examples=[[0.0, 100.0]]
     )

@@ -228,8 +228,11 @@ def plan(
     if rate is not None:
         sample_time = 1.0 / rate
     elif sample_time is None:
-        sample_time = file.sample_time or SAMPLE_TIME
-        whose = "the parameter file's" if file.sample_time else "chosen by default, since the parameter file has none"
+        sample_time = file.sample_time or file.recorded_at or SAMPLE_TIME
+        whose = "the parameter file's" if file.sample_time else (
+            "that of the records behind the model" if file.recorded_at
+            else "chosen by default, since the parameter file has none"
+        )
         defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time sets another.")
     if max_rate is None:
         max_rate = (high - low) / (FULL_SCALE * sample_time)

@@ -26,6 +26,7 @@ from hystgen.records.memory import Columns, in_memory
 from hystgen.records.memory import read as read_memory
 from hystgen.records.reading import LARGEST, SHORTEST, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
+from hystgen.records.told import time_without_unit
 from hystgen.records.units import converted, wanted
 from hystgen.records.writing import columns_text, write_columns
 
@@ -54,6 +55,7 @@ def read_records(
     unnamed = [k for k, source in enumerate(everything) if not isinstance(source, Record | str | os.PathLike)]
     refused: list[str] = []
     ways: dict[str, list[str]] = {}
+    kept = [source for source in everything if isinstance(source, Record)]
     with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
         for k, source in enumerate(everything):
             try:
@@ -75,6 +77,8 @@ def read_records(
         for way, names in ways.items():
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             console.note(f"read as: {', '.join(names[:LISTED])}{more}: {way}")
+        if said := time_without_unit([each for each in found if not any(each is own for own in kept)], sample_time):
+            console.note(f"warning: {said}")
     if refused:
         raise RecordError(refused)
     return found

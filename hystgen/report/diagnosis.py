@@ -104,12 +104,8 @@ def _zoom(found: Diagnosis) -> Viewer:
 
 def _next_step(found: Diagnosis) -> Text:
     """The recommended next step, with its command."""
-    if found.verdict == "unexplained" and not found.result.effects:
-        plan = "hystgen diagnose --plan params.yaml -o plan/"
-        return Text("Your next step: record drives in which every effect shows.", plan)
-    if found.not_emitted():
-        return Text("Your next step: see the tracking error with the model.", "hystgen track params.yaml RECORDS")
-    return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
+    step, command = found.next_step()
+    return Text(f"Your next step: {step}.", command)
 
 
 def _chance(p_value: float) -> str:

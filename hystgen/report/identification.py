@@ -14,7 +14,7 @@ import numpy as np
 
 from hystgen import identification
 from hystgen.basics import arguments, drawing, writing
-from hystgen.basics.problems import counted, percent
+from hystgen.basics.problems import capital, counted, percent
 from hystgen.basics.version import __version__
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
@@ -76,7 +76,9 @@ def report_fit(
     if not isinstance(fit, Fit):
         raise TypeError(f"fit must be a result of hystgen.identify, not {arguments.kind(fit)}")
     sources = [*several(records), *several(holdout)]
-    return write(fit, in_units(read_records(sources), fit.parameters.units, sources=sources), folder)
+    read = in_units(read_records(sources), fit.parameters.units, sources=sources)
+    same = [record.name for record in read] == [record.name for record in fit.records]
+    return write(fit, fit.records if same else read, folder)  # those of the fit are put right
 
 
 def write(
@@ -166,8 +168,10 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     said += [f"Note that {text}." for text in properties.warnings(Model(fit.parameters))]
     if fit.warnings:
         said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
-    command = f"hystgen emit {parameter_file} -o firmware/{operator}"
-    return [*(Text(text) for text in said), Text("Your next step: write the C.", command)]
+    to_fit, held = ([each.name for each in fit.used if each.held_out is out] for out in (False, True))
+    step, command = fit.verdict.next_step(parameter_file, to_fit, held, operator)
+    why = "" if fit.verdict.kind == "good" else f"{capital(fit.verdict.why)}. "
+    return [*(Text(text) for text in said), Text(f"{why}Your next step: {step}.", command)]
 
 
 def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> list[Section]:

@@ -296,7 +296,7 @@ def _ripple(
         others = np.linalg.lstsq(matrix - own, right - own_right, rcond=None)[0]
         holds += bool(np.sum((e - x @ others) ** 2) < (1.0 - acceptance.LINE_SHARE) * np.sum(e**2))
     solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    if holds < acceptance.COMMON_SHARE * len(pieces):
+    if holds < acceptance.COMMON_SHARE * len(pieces) or all(_quantised(items[k].y, pitch) for k in parts):
         return None
     share = removed_share([e for _, e in pieces], [e - x @ solution for x, e in pieces])
     if share < acceptance.LINE_SHARE:
@@ -311,9 +311,14 @@ def _ripple(
         amplitude=float(np.hypot(solution[0], solution[1])),
         share=share,
         records=tuple(dict.fromkeys(items[k].name for k in parts)),
-        converter_step=all(abs(converter_step(items[k].y) / pitch - 1.0) < acceptance.CONVERTER_STEP for k in parts),
     )
     return Removed(finding, after, share)
+
+
+def _quantised(y: Array, pitch: float) -> bool:
+    """Whether a pitch is the converter's step or a whole fraction of it, which is resolution, not ripple."""
+    parts = converter_step(y) / pitch
+    return bool(np.isfinite(parts) and parts > 0.5 and abs(parts / round(parts) - 1.0) < acceptance.CONVERTER_STEP)
 
 
 # The strongest line or ripple first --------------------------------------------------------------------------

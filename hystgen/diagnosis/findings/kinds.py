@@ -226,7 +226,7 @@ class Line(Finding):
 
 @dataclass(frozen=True)
 class Ripple(Finding):
-    """A periodic error over position; `pitch`: output units; `converter_step`: whether this is the converter's step."""
+    """A periodic error over position; `pitch`: output units."""
 
     kind = "ripple"
     optional = frozenset(("repaired",))
@@ -234,7 +234,6 @@ class Ripple(Finding):
     amplitude: float
     share: float
     records: tuple[str, ...]
-    converter_step: bool
     repaired: bool = False
 
     @property
@@ -246,8 +245,7 @@ class Ripple(Finding):
         u = _unit(unit)
         return (
             f"a ripple over the position with a pitch of {self.pitch:.4g}{u}, amplitude {self.amplitude:.3g}{u}, in "
-            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance; "
-            + ("its pitch is the step of the converter" if self.converter_step else INTERPOLATION)
+            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance; {INTERPOLATION}"
             + _taken_out(self.repaired)
         )
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
+from hystgen.basics.problems import capital
 from hystgen.diagnosis.findings import kinds
 from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structured
 from hystgen.diagnosis.search import acceptance
@@ -111,6 +112,10 @@ WRITTEN = {
     "identified": "the model of `identify --model auto`",
 }
 """Descriptions of the model in `params.yaml`."""
+
+
+EXPLAINED_IN = "docs/plants.md explains it"
+"""Where hysteresis that is no play sum is described."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +285,7 @@ class Diagnosis:
 
     def sentence(self) -> str:
         """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
-        parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
+        parts = [f"{capital(each.sentence(self.result.unit))} ({EXPLAINED_IN})" for each in self._of_another_kind()]
         parts += [*self._limits(), *self._known(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
             parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
@@ -288,6 +293,17 @@ class Diagnosis:
         if wrong:
             parts.append(f"The data have faults: {wrong}")
         return " ".join(f"{part}." for part in parts)
+
+    def next_step(self) -> tuple[str, str]:
+        """The next step, and its command."""
+        if self._of_another_kind() and not self.result.effects:
+            fit = "hystgen identify RECORDS --model auto -o auto.yaml"
+            return "fit elements whose minor loops stay open, which auto tries", fit
+        if self._limits() or (self.verdict == "unexplained" and not self.result.effects):
+            return "record drives in which every effect shows", "hystgen diagnose --plan params.yaml -o plan/"
+        if self.not_emitted():
+            return "see the tracking error with the model", "hystgen track params.yaml RECORDS"
+        return "write the compensator as C", "hystgen emit params.yaml -o firmware/"
 
     def uncertain(self) -> list[str]:
         """Parameters at an end of their range, and effects with two parts that coincide."""
@@ -446,10 +462,6 @@ class Diagnosis:
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
         return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
-
-
-def _capital(text: str) -> str:
-    return text[0].upper() + text[1:]
 
 
 def plain(value: object) -> Any:

@@ -559,8 +559,8 @@ RIPPLE_RESOLVED = 0.25
 samples per period. Derived."""
 
 CONVERTER_STEP = 0.02
-"""[fraction of the pitch] A pitch that differs by less than this from the smallest step of the output is the
-converter's. Changed by: acceptance::a_pitch_of_the_converter."""
+"""[fraction of the pitch] A pitch that differs by less than this from the smallest step of the output, or from a whole
+fraction of it, is the converter's and no ripple. Changed by: acceptance::a_pitch_of_the_converter."""
 
 POSITION_BINS = 4096
 """[bins] To find a pitch, the range is divided into this many, and errors are averaged in each: enough for pitches of a
