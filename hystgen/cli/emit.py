@@ -71,7 +71,7 @@ def emit(
 
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
-    from hystgen.basics import arguments
+    from hystgen.basics import arguments, writing
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))

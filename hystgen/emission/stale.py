@@ -162,9 +162,9 @@ def advice(
     found = [each for model in models for each in model.differences]
     lost = _lost(found)
     said = []
-    ends = [each.path.relative_to(folder) for each in found if LINE_ENDS in each.reasons]
+    ends = [each.path for each in found if LINE_ENDS in each.reasons]
     if ends:
-        places = sorted({f"{path.parts[0]}/**" if len(path.parts) > 1 else "*.[ch]" for path in ends})
+        places = sorted({"*.[ch]" if path.suffix in (".c", ".h") else path.name for path in ends})
         lines = " and ".join(f'"{place} text eol=lf"' for place in places)
         said.append(f"git leaves line endings alone with {lines} in .gitattributes")
     groups: dict[tuple[bool, str], list[Stale]] = {}
