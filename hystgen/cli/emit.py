@@ -151,10 +151,15 @@ def _check(
         wrong = [*(each for one in differing for each in one.differences), *unwritten]
         problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
         given = {
-            key: ",".join(value) if key == "integration" else value
+            key: _word(value)
             for key, value in options.items() if value and (key, value) != ("layout", "self-contained")
         }
         raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
+
+
+def _word(value: object) -> str | bool:
+    """An option's value on a command line; True for a flag."""
+    return ",".join(value) if isinstance(value, tuple) else value if isinstance(value, str) else True
 
 
 UNSEALED = ("allow_partial", "manifest", "integration")
@@ -162,7 +167,7 @@ UNSEALED = ("allow_partial", "manifest", "integration")
 
 
 def _stale(
-    one: Emitted, found: list[stale.Difference], chosen: Options, unsealed: Mapping[str, Any]
+    one: Emitted, found: list[stale.Difference], chosen: Options, unsealed: Mapping[str, object]
 ) -> stale.Stale:
     """A model whose files differ, with the options chosen for it; `unsealed`: those that a banner does not contain."""
     from hystgen.emission import calls, stale
@@ -176,6 +181,6 @@ def _stale(
         except ValueError:  # the model no longer exists
             return list(found)
 
-    more = {key: ",".join(value) if key == "integration" else value for key, value in unsealed.items()}
+    more = {key: _word(value) for key, value in unsealed.items()}
     wanted = {key: getattr(chosen, key) for key in OPTIONS} | more
     return stale.Stale(one.parameters, found, wanted, again)

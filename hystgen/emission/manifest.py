@@ -7,7 +7,7 @@ import functools
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,11 +23,11 @@ SCHEMA_ID = "urn:hystgen:manifest:1"
 _HASH = Field(pattern="^[0-9a-f]{64}$", description="SHA-256, in hexadecimal")
 
 
-class _Part(BaseModel):
+class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class File(_Part):
+class File(_Entry):
     """An emitted file."""
 
     name: str
@@ -35,7 +35,7 @@ class File(_Part):
     sha256: str = _HASH
 
 
-class Bound(_Part):
+class Bound(_Entry):
     """An error against the model in double precision: a bound, or the largest error that a search found."""
 
     macro: str = Field(description="its name in the header")
@@ -46,7 +46,7 @@ class Bound(_Part):
     condition: str = Field(default="", description="when a bound holds; empty for always")
 
 
-class Figure(_Part):
+class Figure(_Entry):
     """Bytes or instructions: `proved` from the declarations in the C, or `measured` on emulated cores with models of
     the same parts, whose compilers, flags and records benchmarks/step_costs.py states."""
 
@@ -58,14 +58,14 @@ class Figure(_Part):
     core: str = Field(default="", description="empty for every 32-bit core")
 
 
-class Deviation(_Part):
+class AllowedDeviation(_Entry):
     """A rule from which emitted C may depart, and why that is right there."""
 
     rule: str
     reason: str
 
 
-class Manifest(_Part):
+class Manifest(_Entry):
     """What a safety file says about the emitted C of a model."""
 
     about: tuple[str, ...] = Field(description="origin and hash of this file, as in the banner of every emitted file")
@@ -88,10 +88,10 @@ class Manifest(_Part):
     operations: Mapping[str, str] = Field(description="most operations of a step by operator; proved")
     figures: tuple[Figure, ...]
     licence: str = Field(description="SPDX identifier of the emitted files")
-    misra: tuple[Deviation, ...] = Field(description="deviations from MISRA C:2012")
+    misra: tuple[AllowedDeviation, ...] = Field(description="deviations from MISRA C:2012")
 
 
-def schema() -> dict[str, Any]:
+def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of a manifest."""
     made = Manifest.model_json_schema(mode="serialization")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID, **made}
@@ -149,7 +149,7 @@ def file(module: Module, files: Mapping[str, str]) -> dict[str, str]:
         operations=dict(module.cost.worst_case),
         figures=tuple(_figures(module)),
         licence="0BSD",
-        misra=tuple(Deviation(rule=rule, reason=reason) for rule, reason in deviations()["misra"].items()),
+        misra=tuple(AllowedDeviation(rule=rule, reason=reason) for rule, reason in deviations()["misra"].items()),
     )
     return {f"{one.names.name}_manifest.json": seal(json.dumps(made.model_dump(mode="json"), indent=4) + "\n")}
 

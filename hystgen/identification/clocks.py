@@ -28,11 +28,15 @@ steering mirror near its resonances would show 9e-3."""
 EXPLAINED = 0.9
 """[fraction of the variance] Plays with delays that explain less of the output than this say nothing about delays."""
 
-SECTIONS, PLAYS = 12, 8
-"""Sections of a record, each with a delay of its own, and plays in the fit."""
+SECTIONS = 12
+"""Sections of a record, each with a delay of its own."""
+PLAYS = 8
+"""Plays in the fit."""
 
-ROWS, SCREENED = 6000, 1500
-"""[samples] Compared in a fit, and in the first, which decides whether there is anything to look at."""
+ROWS = 6000
+"""[samples] Compared in a fit."""
+SCREENED = 1500
+"""[samples] Compared in the first fit, which decides whether there is anything to look at."""
 
 MOST = 100_000
 """[samples] A longer record is thinned evenly to about this many."""

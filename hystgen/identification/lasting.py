@@ -52,8 +52,10 @@ passes: some stay out where a smaller loop does not undo the jump before."""
 MOST = 50
 """Largest number of steps in a record; more belong to the actuator, or to a sensor of no use."""
 
-PLAYS, ROWS = 12, 4000
-"""Number of plays in the fit to the whole record, and of samples that are compared in it."""
+PLAYS = 12
+"""Number of plays in the fit to the whole record."""
+ROWS = 4000
+"""[samples] Compared in that fit."""
 
 NEAR = 30
 """[samples] On either side of a step, this many errors of that fit give its size; fewer up to the next step or turn."""
