@@ -343,6 +343,7 @@ def model(name: str, *effects: str, front: str = "") -> Model:
     return Model(parse_parameters(chain(name, *effects, front=front) + ALLOWED, f"{name}.yaml"))
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("more", [0, 2])
 @pytest.mark.parametrize("name", COMBINED)
 def test_the_c_gives_the_bits_of_the_reference(name: str, more: int) -> None:

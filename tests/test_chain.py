@@ -74,7 +74,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=8)
 @pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -89,7 +89,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bo
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
-@pytest.mark.slow(one_in=5)
+@pytest.mark.slow(one_in=12)
 @pytest.mark.thorough
 @pytest.mark.parametrize("core", ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac"])
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_c_of_a_drive_at_rest_gives_the_bits_of_the_reference(name: str, arithme
     assert report.ok, report.table()
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", AT_REST)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -504,7 +504,7 @@ def test_ageing_leaves_the_gain_of_one_sample() -> None:
     assert 0.0 < left <= np.max(np.abs(run.v)) * (steep * step + ageing.TABLE_ERROR)
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("seed", [11, 12])
@@ -971,7 +971,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
     assert {"travel", "set_travel", "set_gain"} <= calls
 
 
-@pytest.mark.slow(one_in=3)
+@pytest.mark.slow(one_in=7)
 @pytest.mark.thorough(but_one_in=12)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])

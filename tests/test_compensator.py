@@ -88,6 +88,7 @@ def both(effects: list[Any], stages: tuple[Any, ...], t: Array, u: Array) -> tup
     return v, chain.simulate([Run(t, v, warm)])[0]
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("uneven", [False, True])
 @pytest.mark.parametrize("front", FRONTS)

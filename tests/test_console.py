@@ -156,6 +156,7 @@ def litter(*folders: Path) -> list[Path]:
     return [path for folder in folders for path in folder.rglob("*")]
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize(
     ("words", "sign"),
     [

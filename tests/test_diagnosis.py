@@ -613,6 +613,7 @@ def test_a_shape_that_contains_a_simpler_one_goes_on_from_it(tmp_path: Path) -> 
     assert containing.rms < simpler.rms
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("curve", [-0.15, 0.15])
 @pytest.mark.thorough
 def test_a_curved_sensor_beside_a_drift(tmp_path: Path, curve: float) -> None:
@@ -727,6 +728,7 @@ def _bent(folder: Path, codes: float, metres: float) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("codes", "metres"), [(436.9, 1e-6), (1e-6, 1e6)])
 def test_units_do_not_matter(codes: float, metres: float, tmp_path: Path) -> None:

@@ -641,6 +641,7 @@ def test_threshold_rate_against_a_loop() -> None:
     assert np.max(np.abs(found - np.array(expected).T)) < 1e-12
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize(("exponent", "tolerance"), [(1.0, 1e-7), (0.4, 2e-5), (2.0, 2e-5), (3.0, 2e-5)])
 @pytest.mark.parametrize("tau", [5e-3, 0.03, 1.0])

@@ -66,7 +66,7 @@ def check_codegen(name: str, **options: str) -> None:
     assert {row.operator for row in report.rows} == {"forward", "inverse"}
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=9)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
@@ -186,6 +186,7 @@ def of_round_numbers(rng: np.random.Generator) -> Model:
 ONCE = (16, 50, 72, 84, 85, 95, 112, 116, 127, 136)  # seeds of models that once gave different bits
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=7)
 @pytest.mark.parametrize("seed", [*range(4), *ONCE])
 def test_bits_equal_in_models_of_round_numbers(seed: int) -> None:
@@ -243,7 +244,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
-@pytest.mark.slow(one_in=6)
+@pytest.mark.slow(one_in=12)
 @pytest.mark.thorough(but_one_in=24)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -276,7 +277,7 @@ ALONE = [
 """Every layout with both operators, and each operator in one layout; for two models, all combinations."""
 
 
-@pytest.mark.slow(one_in=5)
+@pytest.mark.slow(one_in=10)
 @pytest.mark.parametrize(("name", "operator", "layout"), ALONE)
 @pytest.mark.thorough
 def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:
@@ -300,7 +301,7 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
                     assert not kinds & {"U", "D", "d", "B", "b"}, symbols
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
@@ -509,6 +510,7 @@ def renamed(name: str, to: str) -> Model:
     return Model(parse_parameters(text, f"{name}.yaml"))
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", ["x", "n" * MAX_NAME])
 @pytest.mark.parametrize("kind", ["plain", "listed", "bent", "mixed"])
 @pytest.mark.thorough
@@ -542,6 +544,7 @@ def test_every_effect_is_among_them() -> None:
     assert effects(EVERY_EFFECT) == effects(CHAINS)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough
 @pytest.mark.parametrize("arithmetic", ["float64", "q31"])
 @pytest.mark.parametrize("chain", EVERY_EFFECT)

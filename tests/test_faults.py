@@ -194,6 +194,7 @@ class TestOneWrongRow:
         "beyond": lambda v, y, _k: (np.max(v) + 0.3 * np.ptp(v), np.max(y) + 0.3 * np.ptp(y)),
     }
 
+    @pytest.mark.slow(one_in=3)
     @pytest.mark.parametrize("name", ["lines", "fading"])
     @pytest.mark.parametrize("kind", KINDS)
     def test_the_fit_is_that_of_the_record_without_it(self, name: str, kind: str) -> None:
@@ -381,7 +382,7 @@ def scaled(channel: str, factor: float) -> Callable[[Array, Array], tuple[Array,
 class TestSizes:
     """Numbers of any size give a model or a message of one line, and nothing else on stderr."""
 
-    @pytest.mark.slow(one_in=2)
+    @pytest.mark.slow(one_in=5)
     @pytest.mark.parametrize("command", ["identify", "diagnose"])
     @pytest.mark.parametrize(
         ("channel", "factor", "code"),

@@ -105,7 +105,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains whose memoryless part has two branches: fixed point is sometimes on the other branch for a sample."""
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
@@ -427,7 +427,7 @@ REPEATED = 8000
 PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=6)
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", PROVED)
 @BOTH

@@ -185,6 +185,7 @@ needs_gcc = pytest.mark.skipif(
 )
 
 
+@pytest.mark.slow(one_in=3)
 @needs_gcc
 @pytest.mark.parametrize(("name", "operator", "arithmetic", "engine"), KINDS, ids=map("-".join, KINDS))
 def test_nothing_is_there_for_other_models(

@@ -130,6 +130,7 @@ def test_limits_and_constants_of_stdint_are_not_used() -> None:
     assert not {name for name in emitted() if re.fullmatch(r"U?INT\w*_(MAX|MIN|C)|SIZE_MAX", name)}
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("kind", ["list", *HEADERS])
 def test_compiles_behind_other_headers(kind: str, arithmetic: str, tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def fuzz(folder: Path, seconds: float, *module: str, change: Callable[[str], str
 
 
 @needs_clang
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [
@@ -60,7 +60,7 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
 
 
 @needs_clang
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=8)
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [("creeping", "q31", "corners"), ("lagging", "q15", "corners"), ("quick", "q31", "corners"),

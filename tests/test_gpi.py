@@ -431,6 +431,7 @@ class TestIntervals:
             wide += sure.width[0] <= width <= sure.width[1]
         return hits / self.TRIALS, wide / self.TRIALS
 
+    @pytest.mark.slow(one_in=2)
     @pytest.mark.parametrize("colour", [0.0, 0.8])
     @pytest.mark.thorough
     def test_they_hold_the_truth_as_often_as_they_say(self, colour: float) -> None:

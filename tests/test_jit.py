@@ -80,7 +80,7 @@ def test_without_numba_the_bit_reference_gives_the_same_bits(
     same_bits(Model(parse_parameters(FILES["mixed"])).tables(arithmetic, "corners"), arithmetic, monkeypatch)
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=8)
 @pytest.mark.parametrize("engine", EFFECTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "float64", "q15"])
 def test_without_numba_effects_give_the_same_bits(

@@ -125,17 +125,19 @@ def test_every_mutant_changes_its_file(sources: Path) -> None:
         assert (sources / mutant.file).read_text().count(mutant.old) == mutant.count, mutant.what
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("mutant", mutants.KILLED, ids=lambda mutant: mutant.what)
 def test_verify_finds_a_mutant(mutant: Mutant, sources: Path) -> None:
     finds(mutant, sources)
 
 
-@pytest.mark.slow(one_in=6)
+@pytest.mark.slow(one_in=12)
 @pytest.mark.parametrize("mutant", mutants.OF_EFFECTS, ids=lambda mutant: mutant.what)
 def test_verify_finds_a_mutant_of_effects(mutant: Mutant, sources: Path) -> None:
     finds(mutant, sources)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("mutant", mutants.EQUIVALENT, ids=lambda m: f"{m.what}, {m.model}, {m.arithmetic}")
 def test_an_equivalent_mutant_changes_nothing(mutant: Mutant, sources: Path) -> None:
     apply(mutant, sources)

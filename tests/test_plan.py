@@ -270,6 +270,7 @@ class TestCommand:
 class TestSeparation:
     """Plants that share no code with the package, driven as planned, each with one hidden effect."""
 
+    @pytest.mark.slow(one_in=2)
     @pytest.mark.parametrize("name", SAMPLE)
     def test_the_hidden_effect_is_named_first(self, tmp_path: Path, name: str) -> None:
         found = made(tmp_path)

@@ -245,14 +245,14 @@ def alarms(source: Path, machine: str, first: bool = False) -> list[str]:
     return found
 
 
-@pytest.mark.slow(one_in=3)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize(("name", "arithmetic", "engine"), PROVED)
 def test_no_sequence_of_calls_can_fault(name: str, arithmetic: str, engine: str, machine: str, tmp_path: Path) -> None:
     assert alarms(write(tmp_path, name, arithmetic, engine), machine) == []
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=8)
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 @pytest.mark.parametrize("name", EFFECTS)
 def test_no_sequence_of_calls_can_fault_a_model_with_an_effect(name: str, arithmetic: str, tmp_path: Path) -> None:

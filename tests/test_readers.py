@@ -248,6 +248,7 @@ def test_what_cannot_be_read(tmp_path: Path, file: str, data: bytes, said: str) 
     assert said in refused(path)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("name", KINDS)
 def test_a_kind_that_is_cut_or_damaged(tmp_path: Path, name: str) -> None:
     """Whatever is wrong in a file, there is a record or a message."""

@@ -996,6 +996,7 @@ def test_a_pipe_is_read(tmp_path: Path) -> None:
         check(read_record(tmp_path / "pipe"))
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.skipif(sys.platform != "linux", reason="the high-water mark of memory is read as Linux gives it")
 @pytest.mark.parametrize("file", ["record.csv", "faults.csv", "record.npz", "record.mat", "compressed.h5",
                                   "one_group.parquet"])  # fmt: skip

@@ -160,6 +160,7 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
         np.testing.assert_allclose(brute_output(drive, r, p), y, rtol=0, atol=1e-13 * scale)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("unit", units.UNITS, ids=map("-".join, units.UNITS))
 def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str, str, str], tmp_path: Path) -> None:
     """gcc and clang compile the files without warnings, with nothing renamed and nothing left out; engine corners in

@@ -202,6 +202,7 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
     return x, answers, status, np.array([low, high])
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)
 @settings(max_examples=50)
@@ -237,6 +238,7 @@ def test_inverse_does_what_the_contract_says(name: str, engine: str, made: list[
             gathered, unsure = 0, slots.DOMAIN
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)
 @settings(max_examples=50)

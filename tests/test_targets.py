@@ -123,7 +123,7 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert 0 <= (row.stack or 0) < 400
 
 
-@pytest.mark.slow(one_in=6)
+@pytest.mark.slow(one_in=13)
 @pytest.mark.parametrize("operator", ["both", "inverse"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
@@ -218,7 +218,7 @@ ELEMENT_STACK = {"forgetful": 216, "gliding": 200, "sloping": 232}
 numbers in two words in fixed point, which takes 64 to 140 bytes on top of those of a step."""
 
 
-@pytest.mark.slow(one_in=6)
+@pytest.mark.slow(one_in=12)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", WITH_BRAKES)
 def test_models_with_effects_need_little_stack(name: str, arithmetic: str, tmp_path: Path) -> None:
@@ -587,7 +587,7 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
     assert {1, 2, 4, 8, 16} <= set(found)
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=9)
 @pytest.mark.parametrize(
     ("core", "n", "arithmetic", "operator"),
     [
@@ -661,7 +661,7 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
     assert counts.max() <= made.worst(case)[0].max <= bench.GOALS[n][bench.FROM_0]
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [
@@ -692,7 +692,7 @@ def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, e
         assert taken >= 0.8 * most or not gcc, "of both compilers the larger one"
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=9)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31"])
 @pytest.mark.parametrize(
     ("name", "engine"),
