@@ -1081,6 +1081,8 @@ row("an_output_that_moves_further", "BEYOND_GAIN", {3.3: True, 2.7: False},
 # Numbers that tests of whole selections notice ---------------------------------------------------------------
 
 also(test_selection.test_a_small_share_of_edges_is_a_name_by_the_fitted_records, "NAME_SHARE")
+also(test_selection.test_a_rival_that_leaves_the_same_errors_is_not_followed_up, "NEEDLESS")
+also(test_selection.test_next_to_plays_that_depend_on_the_rate_an_element_takes_most, "MOST_OF_GAP")
 also(test_selection.test_nearly_all_that_is_left_is_worth_a_name, "NEARLY_ALL")
 also(test_selection.test_what_is_left_is_enough_where_all_but_the_noise_of_it_is, "FIRST_REMOVES FURTHER_REMOVES")
 also(test_selection.test_all_records_decide_between_equal_numbers, "BETTER")

@@ -53,7 +53,6 @@ SIGNALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "two, float32": (lambda: MODEL.simulate(np.zeros((5, 2)), "float32"), ValueError, r"v must .* not shape \(5, 2\)"),
     "two, inverse": (lambda: INVERSE.simulate(np.zeros((5, 2))), ValueError, r"u must .* not shape \(5, 2\)"),
     "two, session": (lambda: MODEL.session().run([[1.0]]), ValueError, r"not shape \(1, 1\)"),
-    "a table": (lambda: MODEL.simulate(Frame()), ValueError, "pass one of its columns"),
     "ragged": (lambda: MODEL.simulate([[1, 2], [3]]), ValueError, "rows of different lengths"),
     "a file": (lambda: MODEL.simulate("fit.csv"), TypeError, "real numbers .* not 'fit.csv'"),
     "texts": (lambda: MODEL.simulate(["a", "b"]), TypeError, "v must be an array of real numbers"),

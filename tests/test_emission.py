@@ -599,13 +599,16 @@ def test_numbers_of_functions_have_a_name(name: str, arithmetic: str, engine: st
 
 
 def test_templates_hold_no_algorithm() -> None:
-    """Templates are short and have few conditions."""
+    """Templates are short, and those of a module's C have few conditions; those of a unit of FMI define each function
+    of the standard."""
     questions = 0
-    for path in runtime.data_folder("templates").iterdir():
-        text = path.read_text()
-        assert len(text.splitlines()) <= 150, path.name
+    apart = ("fm", "library", "report")
+    for path in runtime.data_folder("templates").rglob("*.*"):
+        text = re.sub("<style>.*?</style>", "", path.read_text(), flags=re.DOTALL)
+        assert len(text.splitlines()) <= (350 if path.name.startswith("fm") else 150), path.name
         tags = re.findall(r"\{[{%].*?[}%]\}", text, flags=re.DOTALL)
-        questions += sum(len(re.findall(r"\b(?:el)?if\b", tag)) for tag in tags)
+        if path.parent.name == "templates" and not path.name.startswith(apart):
+            questions += sum(len(re.findall(r"\b(?:el)?if\b", tag)) for tag in tags)
     assert 0 < questions <= 40
 
 

@@ -418,7 +418,7 @@ class TestSizes:
             assert said == []
             hystgen.load(folder / "new.yaml" if command == "identify" else out / "params.yaml")
         else:
-            assert len(said) == 1, said
+            assert len(said) == 1, "\n".join(said)
             assert "error: " in said[0]
         return done.returncode
 

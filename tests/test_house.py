@@ -242,7 +242,7 @@ def test_walks_stay_short(walk: str, most: int) -> None:
 C_RUNTIME = PACKAGE.parent / "c_runtime"
 
 BOUNDS = {
-    "lines of hystgen/": (63_600, 38_000),
+    "lines of hystgen/": (63_700, 38_000),
     "lines that ask `.fixed`": (10, 10),
     "lines with `Any`": (282, 300),
     "`fmt: skip`": (1, 30),

@@ -594,7 +594,7 @@ REFUSED = [
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
         '5:83: emit.x: unknown key; valid here: output, operator, arithmetic, engine, optimize, drive_lsb, '
-        'output_lsb, compensation',
+        'output_lsb, compensation, converter',
     ]),
     case('emit_output', H + M + "emit: {output: 3}\n", [
         '5:16: emit.output: must be text, not 3; put it in quotes',
@@ -1129,7 +1129,7 @@ def test_schema_refuses_what_it_can_see() -> None:
         "yaml_1_1", "tag_directive", "anchor", "tag", "tag_on_top", "tagged_key", "format_float", "name_keyword",
         "description_odd", "units_line", "underscore_number", "range_reversed", "range_empty", "thresholds_start",
         "thresholds_order", "weights_length", "weights_zero", "state_length", "state_one", "density_n_float",
-        "density_unreachable", "density_formula", "density_negative", "density_singular", "density_pole",
+        "density_unreachable", "emit_output_lines", "density_formula", "density_negative", "density_singular", "density_pole",
         "density_not_finite", "density_zero", "density_huge", "table_order", "table_length", "density_state_length",
         "tanh_sign", "tanh_too_flat", "effect_lengths", "effect_no_plays", "effect_twice", "effect_spectrum", "effect_user",
     }  # fmt: skip

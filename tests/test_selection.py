@@ -321,7 +321,7 @@ def test_what_lags_is_sought_in_the_place_of_what_lags(
     def step(*given: Any) -> None:
         asked.append(given[3])
 
-    for other in ("without_effect", "_without_refit"):
+    for other in ("without_effect", "without_refit"):
         monkeypatch.setattr(selection, other, lambda *_: SimpleNamespace())
     monkeypatch.setattr(selection, "_step", step)
     found = [selection.Found(each, "", 1.0, 1.0, 0.0, ()) for each in (name, "bouc_wen")]

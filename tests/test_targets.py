@@ -10,6 +10,7 @@ import shutil
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -550,8 +551,7 @@ def test_counts_are_the_same_in_two_runs() -> None:
             model("curved"), targets=["cortex-m0plus", "cortex-m33"], compiler=["zig"], target_length=200
         )
         assert report.ok
-        found: list[Row] = report.rows
-        return found
+        return [replace(row, seconds=0.0) for row in report.rows]
 
     assert rows() == rows()
 

@@ -3,6 +3,9 @@
 #define HYSTGEN_CONVERTER_C
 #include "compensator/model.h"
 #include "compensator/clamp.c"
+#ifndef HYSTGEN_CONFIGURED
+#include "compensator/api.h"
+#endif
 
 /* The nearest of a converter's codes. */
 static int32_t hystgen_nearest_code(int32_t code, int32_t least, int32_t most) {
@@ -72,7 +75,7 @@ int32_t hystgen_code_from_drive(hystgen_real_t drive) {
 
 #ifndef HYSTGEN_FORWARD
 int32_t hystgen_inverse_step_code(hystgen_inverse_t *self, int32_t code) {
-    const hystgen_real_t drive = hystgen_inverse_step(self, hystgen_reference_from_code(code));
+    const hystgen_real_t drive = hystgen_operator_step(self, hystgen_reference_from_code(code));
     const int32_t sent = hystgen_code_from_drive(drive);
     hystgen_inverse_commit(self, hystgen_clamp_drive(hystgen_drive_from_code(sent)));
     return sent;

@@ -1,7 +1,8 @@
-"""Numbers of a parameter file, as pydantic types."""
+"""Numbers of a parameter file: pydantic types, and exact values."""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
@@ -24,3 +25,8 @@ def _float(value: float) -> float:
 Number = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
 Positive = Annotated[float, Field(gt=0, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
 NotNegative = Annotated[float, Field(ge=0, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
+
+
+def decimal(x: float) -> Fraction:
+    """The exact value of the number as written: 0.001 is exactly a thousandth, which no double is."""
+    return Fraction(repr(float(x)))

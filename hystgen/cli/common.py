@@ -234,12 +234,7 @@ def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[
     def with_joined(command: Callable[..., object]) -> Callable[..., object]:
         @functools.wraps(command)
         def run(*, data: tuple[str, ...], join: tuple[tuple[str, str], ...], **others: object) -> object:
-            from hystgen import records
-
-            everything = (*data, *(records.MARK.join(pair) for pair in join))
-            for path in itertools.chain(*join):
-                if not os.path.exists(records.files(path)[0]):
-                    raise Failed(f"error: --join {path}: there is no such file; give the files of two channels", 2)
+            everything = (*data, *joined(join))
             if required and not everything:
                 raise click.UsageError("Missing argument 'DATA...'.")
             return command(data=everything, **others)
@@ -247,6 +242,16 @@ def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[
         return click.argument("data", nargs=-1, type=click.Path(), callback=matched)(run)
 
     return with_joined
+
+
+def joined(pairs: tuple[tuple[str, str], ...]) -> list[str]:
+    """The records of `--join`, each of two files."""
+    from hystgen import records
+
+    for path in itertools.chain(*pairs):
+        if not os.path.exists(records.files(path)[0]):
+            raise Failed(f"error: --join {path}: there is no such file; give the files of two channels", 2)
+    return [records.MARK.join(pair) for pair in pairs]
 
 
 class ReadingArguments(TypedDict):

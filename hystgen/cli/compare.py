@@ -39,7 +39,7 @@ class _Holding(click.Command):
 @click.command(cls=_Holding, short_help="Show models side by side on records.")
 @click.argument("params", nargs=-1, required=True, type=click.Path())
 @click.option(
-    "--holdout", multiple=True, required=True, type=click.Path(), callback=common.matched,
+    "--holdout", multiple=True, type=click.Path(), callback=common.matched,
     help="record to compare on, best one that no model was fitted to; or a pattern in quotes, 'held/*.csv'; repeatable",
 )
 @click.option("-o", "output", type=click.Path(file_okay=False), help="folder for a page, its picture and the JSON")
@@ -51,7 +51,7 @@ class _Holding(click.Command):
 def compare(
     params: tuple[str, ...], holdout: tuple[str, ...], output: str | None, plot: str | None, json_file: str | None,
     effects: tuple[str, ...], history: str | None, rest: float, skip: float,
-    **reading: Unpack[common.ReadingArguments],
+    join: tuple[tuple[str, str], ...], **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Show models side by side on records: how far each is from the measured motion, and which is the closest.
 
@@ -61,6 +61,9 @@ def compare(
     """
     from hystgen.basics import drawing, extras, writing
 
+    holdout = (*holdout, *common.joined(join))
+    if not holdout:
+        raise click.UsageError("Missing option '--holdout'.")
     common.guarded(params[0], partial(extras.require_fit, "compare", plot=bool(plot or output)))
     from hystgen.comparison import Comparison
     from hystgen.report import comparison as report

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.arithmetic import Arithmetic
 from hystgen.basics.problems import FormatError
-from hystgen.compensator.fixed_tables import decimal
+from hystgen.basics.quantities import decimal
 from hystgen.plays.slots import OP_COMMIT, OP_STEP, OP_UNREAD, Bytes
 
 if TYPE_CHECKING:

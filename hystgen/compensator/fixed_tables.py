@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from hystgen.arithmetic import FIXED
 from hystgen.basics.problems import FormatError, Path, counted
+from hystgen.basics.quantities import decimal
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import error_bounds, largest_sum
 from hystgen.compensator.layout import FixedTables, first_moves
@@ -142,11 +143,6 @@ def _rounded_up(x: Fraction) -> str:
     """A positive number rounded up to six digits."""
     up = Context(prec=6, rounding=ROUND_CEILING)
     return f"{float(up.divide(Decimal(x.numerator), Decimal(x.denominator))):.6g}"
-
-
-def decimal(x: float) -> Fraction:
-    """The exact value of the number as written: 0.001 is exactly a thousandth, which no double is."""
-    return Fraction(repr(float(x)))
 
 
 class Builder:

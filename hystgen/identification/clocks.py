@@ -125,7 +125,8 @@ def skew(record: Record) -> Skew | None:
     if not (np.isfinite(v).all() and np.isfinite(y).all()) or np.ptp(v) == 0.0 or np.ptp(y) == 0.0:
         return None
     every = max(1, len(t) // MOST)
-    t, v, y = t[::every] - t[0], v[::every], y[::every]
+    # in fractions of their ranges: squares in an odd unit could overflow, and a delay depends on neither unit
+    t, v, y = t[::every] - t[0], v[::every] / np.ptp(v), y[::every] / np.ptp(y)
     with parallel.one_thread():
         turns = len(pi.corners(v))
         if turns < 4:
@@ -212,6 +213,8 @@ def _growth(t: Array, v: Array, y: Array, most: int) -> _Growth | None:
     speed = np.gradient(weights[: len(r)] @ plays, t)[some]
     drifting = np.column_stack([plain, about[:, None] ** 2, plays[:, some].T * about[:, None]])
     section = np.minimum(((about + 1.0) * 0.5 * SECTIONS).astype(int), SECTIONS - 1)
+    if np.ptp(y[some]) == 0.0:
+        return None
     delayed = -speed[:, None] * (section[:, None] == np.arange(SECTIONS))
     # the sections' delays beside everything else: project that out of both sides
     basis, *_ = np.linalg.svd(drifting / np.maximum(np.linalg.norm(drifting, axis=0), 1e-300), full_matrices=False)

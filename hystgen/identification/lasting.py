@@ -285,7 +285,9 @@ class _Whole:
         with parallel.one_thread():
             weights, *_ = np.linalg.lstsq(table[:, some].T, y[some], rcond=pi.SENSED_RANK)
         errors = y[some] - weights @ table[:, some]
-        return cls(np.asarray(weights[len(table) - len(at) :], dtype=np.float64), float(np.sqrt(np.mean(errors**2))))
+        most = float(np.max(np.abs(errors)))  # squares of errors in an odd unit could overflow
+        rms = most * float(np.sqrt(np.mean((errors / most) ** 2))) if most > 0.0 else 0.0
+        return cls(np.asarray(weights[len(table) - len(at) :], dtype=np.float64), rms)
 
 
 def _sizes(v: Array, y: Array, at: Indices) -> Array:

@@ -55,7 +55,9 @@ def given(
     """
     foreign.refuse(column, source)
     like = partial(foreign.alike, source, answer) if foreign.package(source) else _array
-    if isinstance(source, Mapping) or hasattr(source, "columns") or hasattr(source, "column_names"):
+    names = getattr(source, "columns", getattr(source, "column_names", None))
+    columnar = names is not None and not callable(names)  # a Record has a method of that name
+    if isinstance(source, Mapping) or columnar:
         try:
             found = memory.whole(source, column, units)  # type: ignore[arg-type]
         except RecordError as error:
