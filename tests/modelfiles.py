@@ -140,3 +140,9 @@ NOTCHED = {
 """A notch, and averages that limit the noise gain, both over past references only."""
 
 INVERSE_ALONE = ("viscous_twin",)
+
+CODED = {
+    "coded": head("coded") + PLAYS + "emit: {converter: {reference: {bits: 12, range: [-9, 9], "
+    "coding: twos-complement}, drive: {bits: 8, range: [-5, 5.1], coding: offset-binary}}}\n"
+}
+"""A model whose references come from a converter and whose drives go to one."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from modelfiles import BRAKED, CALM, CHAINS, FILES, LED, PLAYS, STEADY, head
+from modelfiles import BRAKED, CALM, CHAINS, CODED, FILES, LED, PLAYS, STEADY, head
 
 ALONE = "hystgen/effects/slew_limit/slewed.c"
 CODES = "c_runtime/compensator/code.c"
@@ -46,8 +46,7 @@ MODELS = {
     "steady": STEADY,
     "braked": BRAKED,
     "calm": CALM,
-    "coded": head("coded") + PLAYS + "emit: {converter: {reference: {bits: 12, range: [-9, 9], "
-    "coding: twos-complement}, drive: {bits: 8, range: [-5, 5.1], coding: offset-binary}}}\n",
+    **CODED,
     # the plays that start lowest begin to follow right at the limit
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import units
-from modelfiles import CHAINS, FILES, LED
+from modelfiles import CHAINS, CODED, FILES, LED
 
 import hystgen
 from hystgen.emission import manifest
@@ -57,6 +57,8 @@ MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("worn", "both", "q15", "loop", "single-header"),
     ("everything", "inverse", "float32", "corners", "self-contained"),
     ("led", "both", "q31", "corners", "shared-runtime"),
+    ("coded", "inverse", "float32", "corners", "single-header"),
+    ("coded", "both", "q15", "loop", "self-contained"),
 )
 
 # cppcheck reads no system headers: these are the values of <float.h> on every target, and the core with the most code
@@ -86,7 +88,7 @@ class Finding:
 
 def emit(folder: Path, name: str, operator: str, arithmetic: str, engine: str, layout: str) -> list[Path]:
     """Emit a module into `folder` and return the C files to compile."""
-    model = Model(parse_parameters({**FILES, **CHAINS, **LED}[name], f"{name}.yaml"))
+    model = Model(parse_parameters({**FILES, **CHAINS, **LED, **CODED}[name], f"{name}.yaml"))
     hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic, engine=engine, layout=layout)
     if layout == "single-header":
         (folder / f"{name}.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')

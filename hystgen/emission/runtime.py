@@ -617,7 +617,8 @@ def piece_of(text: str) -> Piece:
 
 def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
     """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
-    coded = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name in CODED] if variant.coded else []
+    every = {piece.name: piece for piece in _pieces(["compensator/api.h"], ())}
+    coded = [every[name] for name in CODED] if variant.coded else []
     return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *coded]
 
 
