@@ -32,9 +32,6 @@ SIDE_BY_SIDE = 3
 GAP = 0.03
 """[fraction of the total time] Space between two records in a panel."""
 
-FAR = 25.0
-"""[times the noise] If a deviation is larger, the scale is logarithmic beyond the noise."""
-
 ROOM = 1.08
 """Height of the common scale, as a multiple of the largest deviation of a model."""
 
@@ -58,8 +55,7 @@ compare = _with_page(comparison.compare)
 def figure(found: Comparison, width: float = WIDE) -> Figure:
     """The rms deviation of every model beside the noise, and below it every model's deviation over time, on one scale.
 
-    The straight line is in the first part alone. If a deviation is far above the noise, the scale is linear within the
-    noise and logarithmic beyond it, since a small deviation beside a large one would be a flat line.
+    The straight line is in the first part alone.
     """
     number = len(found.models)
     across = 1 if width == NARROW else 2 if number in (2, 4) else min(SIDE_BY_SIDE, number)
@@ -70,16 +66,11 @@ def figure(found: Comparison, width: float = WIDE) -> Figure:
     _bars(top.subplots(), found, width)
     panels = below.subplots(down, across, sharex=True, sharey=True, squeeze=False)
     most = ROOM * max(max(each.most for each in found.models), found.noise)
-    far = most > FAR * found.noise
-    decades = 10.0 ** np.arange(np.ceil(np.log10(2.0 * found.noise)), np.floor(np.log10(most)) + 1.0)
     for k, axes in enumerate(panels.flat):
         if k >= number:
             axes.set_axis_off()
             continue
         _over_time(axes, found, found.models[k])
-        if far:
-            axes.set_yscale("symlog", linthresh=found.noise)
-            axes.set_yticks([*(-decades), 0.0, *decades])
         axes.set_ylim(-most, most)
         axes.set_title(_short(found.models[k].name, 30), fontsize=9)
         if k % across == 0:
@@ -100,9 +91,8 @@ def _bars(axes: Axes, found: Comparison, width: float) -> None:
         place = max(each.rms, 1e-300), k
         axes.annotate(f"{each.rms:.3g}", place, (8.0, 0.0), textcoords="offset points", va="center", fontsize=9)
     axes.axvline(found.noise, color=drawing.FAULT, linestyle="--", linewidth=1.1, label="noise")
-    axes.set_xscale("log")
     low, high = min(found.noise, *(each.rms for each in every)), max(each.rms for each in every)
-    axes.set_xlim(0.6 * low, high * (high / low) ** (0.15 if width == WIDE else 0.35) * 1.3)
+    drawing.decades(axes, "x", (0.6 * low, high * (high / low) ** (0.15 if width == WIDE else 0.35) * 1.3))
     axes.set_yticks(range(len(every)), [_short(each.name, 40 if width == WIDE else 18) for each in every])
     axes.set_ylim(len(every) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
@@ -139,8 +129,8 @@ def html(found: Comparison) -> str:
     picture = Picture(
         "deviations", wide, narrow,
         f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and what cannot be told "
-        "from it. Below: measured minus model over time, on one scale for all models, which is logarithmic beyond the "
-        "noise (dashed, 1 sd) if a deviation is far above it. Samples that are not compared are left out.",
+        "from it. Below: measured minus model over time, on one scale for all models; dashed: the noise, 1 sd. Samples "
+        "that are not compared are left out.",
         "The rms deviation of each model beside the noise, and panels with each model's deviation over time.",
     )
     rows = found.rows()
