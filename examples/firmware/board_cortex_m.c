@@ -20,8 +20,6 @@ static void (*control_step)(void);
 static volatile bool late;
 
 void board_reset(void);
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ size);
-void *memset(void *to, int value, __SIZE_TYPE__ size);
 
 static uint32_t host(uint32_t operation, const void *argument) {
     register uint32_t r0 __asm__("r0") = operation;
@@ -84,23 +82,6 @@ void board_reset(void) {
         *(volatile uint32_t *)to = 0u;
     }
     board_exit(main());
-}
-
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ size) {
-    volatile char *a = to;
-    const char *b = from;
-    while (size-- > 0u) {
-        *a++ = *b++;
-    }
-    return to;
-}
-
-void *memset(void *to, int value, __SIZE_TYPE__ size) {
-    volatile char *a = to;
-    while (size-- > 0u) {
-        *a++ = (char)value;
-    }
-    return to;
 }
 
 typedef void (*vector_t)(void);

@@ -19,8 +19,6 @@ static uint64_t next;
 
 void board_trap(void);
 void board_entry(void);
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ size);
-void *memset(void *to, int value, __SIZE_TYPE__ size);
 
 __asm__(".section .entry,\"ax\"\n"
         ".globl board_reset\n"
@@ -94,21 +92,4 @@ void board_entry(void) {
         *(volatile uint32_t *)to = 0u;
     }
     board_exit(main());
-}
-
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ size) {
-    volatile char *a = to;
-    const char *b = from;
-    while (size-- > 0u) {
-        *a++ = *b++;
-    }
-    return to;
-}
-
-void *memset(void *to, int value, __SIZE_TYPE__ size) {
-    volatile char *a = to;
-    while (size-- > 0u) {
-        *a++ = (char)value;
-    }
-    return to;
 }
