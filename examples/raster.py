@@ -89,7 +89,7 @@ def between(x: Array) -> float:
 
 
 def seen(x: Array, y: Array) -> Array:
-    """What the tip sees of a chequered sample, as `rows`."""
+    """The image that the tip takes of a chequered sample, as `rows`."""
     return rows((np.floor(x / PITCH) + np.floor(y / PITCH)) % 2.0)
 
 

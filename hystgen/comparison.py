@@ -46,7 +46,8 @@ PLAIN = 7
 
 @dataclass(frozen=True)
 class CostOfC:
-    """Cost of the emitted C on a Cortex-M4F: `instructions` of the dearest sample, bytes of `flash` and of `ram`."""
+    """Cost of the emitted C on a Cortex-M4F: `instructions` of the most expensive sample, bytes of `flash` and of
+    `ram`."""
 
     instructions: int
     flash: int
@@ -269,10 +270,10 @@ def compare(
     """Models side by side on records that took no part in their fits.
 
     `models`: models, parameter files, or results that have a model; `holdout`: measured records, as for `diagnose`, and
-    in the units of the first model, to which everything is converted. Nothing is fitted but what no model can know: the
-    offset of each record and, without `history`, the state in which it starts. The straight line, the baseline, has one
-    slope for all records. `names`: of the models, by default their paths or their own names; `history`, `rest`, `skip`:
-    as for `diagnose`.
+    in the units of the first model, to which everything is converted. The only quantities fitted are those that no
+    model can know: the offset of each record and, without `history`, its start state. The straight line, the baseline,
+    has one slope for all records. `names`: of the models, by default their paths or their own names; `history`, `rest`,
+    `skip`: as for `diagnose`.
 
     Raises RecordError, ParameterError, EffectsError, IdentificationError for too few samples, ValueError, TypeError.
     """
@@ -350,7 +351,7 @@ def _factor(unit: str, to: str, column: str) -> float:
 
 
 def _scaled(item: Item, drive: float, output: float) -> Item:
-    """An item in units of which the old ones are `drive` and `output` times as large."""
+    """An item in new units; the old ones are `drive` and `output` times as large."""
     if drive == output == 1.0:
         return item
 

@@ -299,7 +299,7 @@ class Model:
 
     def _check_slew(self, step: float, seconds: float) -> None:
         """Raise FormatError if a slew limit is less than one `step` of the drive's converter per sample: each sample
-        begins at the drive that the converter made, so that the drive would stand still."""
+        begins at the drive that the converter produced, so the drive would stand still."""
         from hystgen.compensator.chain.layout import rates
         from hystgen.compensator.chain.parts import Parts
 
@@ -384,9 +384,9 @@ class Model:
     ) -> NDArray[np.int64]:
         """Codes (N,) of drives for codes (N,) of references, as NAME_inverse_step_code of the emitted C gives them.
 
-        Each step commits the drive that its code makes. Without `arithmetic` or `engine`, those of the parameter file.
-        Raises ValueError without `emit.converter` in the parameter file and for codes that are not whole numbers, and
-        what `emit` raises.
+        Each step commits the drive that its code produces. Without `arithmetic` or `engine`, those of the parameter
+        file. Raises ValueError without `emit.converter` in the parameter file and for codes that are not whole numbers,
+        and what `emit` raises.
         """
         from hystgen.compensator import converter
 

@@ -12,7 +12,7 @@
 
 #define APPROACH 2000 /* samples on the way to the scan's first corner, which are not judged */
 #define SAMPLES 9000  /* and seven lines of the fast axis, 0.45 s in all */
-#define LINE 1000     /* samples of a line, forth and back */
+#define LINE 1000     /* samples of a line, back and forth */
 #define START 2294    /* code of 0.7 um, about where the stages stand at 0 V */
 #define CORNER 13107  /* code of 4 um */
 #define LIMITED (AXIS_X_STATUS_INPUT_CLAMPED | AXIS_X_STATUS_OUTPUT_CLAMPED)
@@ -34,7 +34,7 @@ static float sum[2];         /* of errors, um, */
 static float square[2];      /* and of their squares, um^2 */
 static float position[2];    /* um, after the last sample */
 
-/* The ADC: codes of 16 bits for 0 .. 20 um. The fast axis goes forth and back, the slow one along. */
+/* The ADC: codes of 16 bits for 0 .. 20 um. The fast axis goes back and forth, the slow one along. */
 static int32_t adc(int axis, int at) {
     const int scanned = at - APPROACH;
     if (scanned < 0) {

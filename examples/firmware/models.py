@@ -1,8 +1,8 @@
 """Models of the two simulated stages, from recordings of them: `python examples/firmware/models.py`.
 
-Each stage is recorded as a bench would record it: slow loops and a hold, at 1 kHz, and a fast sweep at 20 kHz. That
-the ceramic creeps and the amplifier lags is known; the model with both becomes models/axis_x.yaml, the plays alone
-become models/plays_x.yaml.
+Each stage is recorded as a bench would record it: slow loops and a hold, at 1 kHz, and a fast sweep at 20 kHz. The
+creep of the ceramic and the lag of the amplifier are known effects; the model with both becomes models/axis_x.yaml, the
+plays alone become models/plays_x.yaml.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
  *     v = stage_x_mex('step', axis, u)    one step for each element of u
  *     s = stage_x_mex('status', axis)     status bits, read and cleared
  *     stage_x_mex('reset', axis, u)       all plays at 0, then one step to u
- *     stage_x_mex('free', axis)           gives the instance back
+ *     stage_x_mex('free', axis)           releases the instance
  *
  * For another model, replace stage_x; for float32, drive and reference are rounded to float in `stepped`.
  */

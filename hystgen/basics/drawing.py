@@ -183,7 +183,7 @@ def noise_lines(axes: Axes, noise: float | None) -> None:
 
 
 def decades(axes: Axes, which: str, limits: tuple[float, float] | None = None) -> None:
-    """Make an axis logarithmic, with few plain numbers; `limits`: its ends, those of what is drawn if not given."""
+    """Make an axis logarithmic, with few plain numbers; `limits`: its ends, by default those of the drawn data."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axes.set(**{f"{which}scale": "log"})

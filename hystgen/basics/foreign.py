@@ -1,4 +1,4 @@
-"""Objects of other packages, told by the modules of their classes: none of these packages is imported for that."""
+"""Objects of other packages, recognised by the modules of their classes without importing the packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def package(source: object) -> str:
 
 
 def refuse(name: str, source: object) -> None:
-    """Raise TypeError, saying what to pass instead, for an object of these packages that is no table of samples."""
+    """Raise TypeError, saying what to pass instead, for an object of these packages that is not a table of samples."""
     of, kind = package(source), type(source).__name__
     if of == "polars" and kind == "LazyFrame":
         raise TypeError(f"{name} is a LazyFrame, which has no values yet; pass its .collect()")

@@ -43,7 +43,7 @@ def suite(name: str, classname: str, cases: Sequence[Case], properties: Mapping[
 
 
 def document(name: str, suites: Sequence[ElementTree.Element]) -> str:
-    """The file: a single suite by itself, or several in one element with their sums."""
+    """The file: a single suite by itself, or several in one element with their totals."""
     if len(suites) == 1:
         return _xml(suites[0])
     root = ElementTree.Element("testsuites", name=name)

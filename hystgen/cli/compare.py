@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class _Holding(click.Command):
     """A command whose `--holdout` also takes the further files to which a shell expands a pattern, as in `held/*.csv`.
 
-    A parameter file among them, which ends in .yaml or .yml, stays one.
+    A file among them that ends in .yaml or .yml stays a parameter file.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -30,7 +30,7 @@ SUM_BITS = 62
 
 @dataclass(frozen=True)
 class CodeLine:
-    """A quantity over its converter's codes `least` .. `most`: `zero` at code 0, and `step` more at the next one."""
+    """A quantity, linear in its converter's codes `least` .. `most`: `zero` at code 0, and `step` more per code."""
 
     least: int
     most: int

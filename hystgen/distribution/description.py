@@ -24,7 +24,7 @@ PARAMETERS = 16
 """Value references, as in `templates/fmu.c.j2`: 0 is the time, and the parameters begin at the last one."""
 
 SAMPLES = 1000
-"""Samples of the experiment that a unit proposes; the length means nothing."""
+"""Number of samples in the default experiment of a unit; the length is arbitrary."""
 
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """Base units in FMI's order."""
@@ -52,7 +52,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Description:
-    """All that modelDescription.xml says of a unit."""
+    """The content of a unit's modelDescription.xml."""
 
     model: Model
     fmi: int
@@ -95,7 +95,7 @@ def parameters(model: Model) -> list[Parameter]:
 
 
 def _numbers(path: str, part: BaseModel, drive: str, output: str) -> Iterator[Parameter]:
-    """All numbers of a part of the parameter file, with the units that its schema states behind the last comma."""
+    """All numbers of a part of the parameter file, with the units that its schema states after the last comma."""
     for key, field in type(part).model_fields.items():
         about = " ".join((field.description or "").split())
         yield from _values(f"{path}.{key}", getattr(part, key), _stated(about, drive, output), about, drive, output)

@@ -142,7 +142,8 @@ def _code(one: Description, operator: str, arithmetic: str) -> str:
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:
-    """Mach-O libraries for different processors as one, which starts with a table of processor, place and size."""
+    """Mach-O libraries for different processors as one file, which starts with a table of processor, offset and
+    size."""
     start = 1 << _ALIGNMENT
     table, body = struct.pack(">II", _MAGIC, len(libraries)), b""
     for each in libraries:

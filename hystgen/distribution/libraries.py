@@ -21,7 +21,7 @@ LAYOUT = "self-contained"
 """Layout of the C in a binary: all functions but the public ones are static, so only those are exported."""
 
 SUPPORT = "shared-library.c"
-"""File of the functions beside the emitted C; with a hyphen, it is not called like a model's."""
+"""File of the functions beside the emitted C; the hyphen keeps its name from being that of a model."""
 
 # Without debug information and symbols nothing depends on the folder in which zig runs. STRICT computes the bits of the
 # reference

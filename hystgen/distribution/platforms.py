@@ -51,7 +51,7 @@ PLATFORMS = {
         Platform("wasm32", "wasm32-freestanding", "wasm", ("-nostdlib", "-Wl,--no-entry", "-Wl,--export=__heap_base")),
     )
 }
-"""The platforms by name. None gets a C library, so the libraries depend on no version of one."""
+"""The platforms by name. None links a C library, so no version of one is required."""
 
 
 def find(name: str) -> Platform:

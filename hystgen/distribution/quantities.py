@@ -1,4 +1,4 @@
-"""Units in the terms of the FMI standard: exponents of the SI's base units, a factor and an offset."""
+"""Units in terms of the FMI standard: exponents of the SI's base units, a factor and an offset."""
 
 from __future__ import annotations
 

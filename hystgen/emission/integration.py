@@ -1,6 +1,7 @@
 """Packages for build tools: a folder for each model, and for a shared run time, with the C and the tools' files.
 
-The folder is complete: a tool may copy it elsewhere. Its files are the same whichever tools are asked for together.
+The folder is complete: a tool may copy it elsewhere. Each tool's files are the same whichever other tools are
+requested.
 """
 
 from __future__ import annotations
@@ -40,13 +41,13 @@ FILES = {
 """Files of each tool within a package, and their templates; none for JSON. NAME stands for the package's name."""
 
 WITH_SELFTEST = ("test/", "test_package/", "examples/")
-"""Folders of a package that a shared run time, which has no self-test, does not get."""
+"""Package folders that a shared run time lacks, since it has no self-test."""
 
 RESERVED = (
     "all", "benchmark", "clean", "dist", "dl", "edit_cache", "gcc", "help", "install", "package", "package_source",
     "rebuild_cache", "rt", "test", "uninstall", "util",
 )
-"""Names of targets that the tools make themselves, and of libraries of the system, which a model's would hide."""
+"""Names of targets that the tools make themselves, and of system libraries, which a model's library would hide."""
 
 
 @dataclass(frozen=True)

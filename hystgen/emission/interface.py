@@ -283,8 +283,8 @@ def limits(one: EmittedModel) -> list[str]:
 @dataclass(frozen=True)
 class StatedError:
     """An error that the header states: its macro without the model's prefix, its `value` in the `unit` of a `side`,
-    drive or output; `samples`: None for a bound; `condition`: when a bound holds, empty for always; `what`: of which it
-    is the error."""
+    drive or output; `samples`: None for a bound; `condition`: when a bound holds, empty for always; `what`: the
+    quantity in error."""
 
     macro: str
     value: Number

@@ -61,7 +61,7 @@ BEYOND = 0.1
 farther out, every model is a guess."""
 
 STEP_DIGITS = 6
-"""Digits of the records' sample time in the parameter file: times written in decimals differ beyond."""
+"""Digits of the records' sample time in the parameter file: decimal times differ beyond these."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -119,10 +119,10 @@ def identify(
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
       part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
-    - `clock_skew`: growth of the delay of y after v, in ppm of time, to take out of every record, because drive and
-      sensor were sampled with clocks of their own; `auto`: that of each record, where it is significant. By default it
-      is only reported.
-    - `strict`: raise UselessError where the figures say that the model is of no use (`Fit.verdict`).
+    - `clock_skew`: growth of the delay of y after v, in ppm of time, to remove from every record, if drive and sensor
+      were sampled with separate clocks; `auto`: that of each record, if it is significant. By default it is only
+      reported.
+    - `strict`: raise UselessError if the figures say that the model is of no use (`Fit.verdict`).
     - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
     The start memory in the parameter file is the memory after `history`. Without a history it is 0, as in a virgin

@@ -1,9 +1,9 @@
-"""Drive and sensor on clocks of their own: the delay between them grows evenly along the record.
+"""Drive and sensor on separate clocks: the delay between them grows steadily along the record.
 
-A delay d adds `-d y'` to the output. In a fit of plays, whose weights may drift, the record's sections each get a delay
-of their own; on clocks that differ by a skew s, these lie on a straight line over time with the slope s. A lag of the
-sensor has no slope; creep, ageing and warming move weights and offsets rather than delays, and slow down; and what
-depends on the speed or the amplitude of the drive goes with these, which the line is told apart from.
+A delay d adds `-d y'` to the output. A fit of plays, whose weights may drift, gives each section of the record its own
+delay; if the clocks differ by a skew s, these delays lie on a straight line over time with the slope s. A lag of the
+sensor has no slope; creep, ageing and warming move weights and offsets rather than delays, and slow down; and a delay
+that depends on the speed or the amplitude of the drive varies with these, which distinguishes it from the line.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from hystgen.records import Record
 Array = NDArray[np.float64]
 
 LARGEST = 3e-3
-"""[s per s] A larger skew is no skew: crystals are within 1e-4, what computers time within some 1e-3. The records of a
-steering mirror near its resonances would show 9e-3."""
+"""[s per s] A larger slope is not a clock skew: crystals are within 1e-4, software timing within about 1e-3. The
+records of a steering mirror near its resonances would show 9e-3."""
 
 EXPLAINED = 0.9
 """[fraction of the variance] Plays with delays that explain less of the output than this say nothing about delays."""
@@ -34,30 +34,31 @@ PLAYS = 8
 """Plays in the fit."""
 
 ROWS = 6000
-"""[samples] Compared in a fit."""
+"""[samples] Number compared in a fit."""
 SCREENED = 1500
-"""[samples] Compared in the first fit, which decides whether there is anything to look at."""
+"""[samples] Number compared in the first fit, which decides whether a closer look is worthwhile."""
 
 MOST = 100_000
 """[samples] A longer record is thinned evenly to about this many."""
 
 SUSPECT, SURE, UNLIKE_SURE = 3.0, 6.0, 12.0
-"""[standard deviations] A skew is looked at closely, and told, above these; with 10 degrees of freedom, chance exceeds
-6 in one of 8000 records. If the drive's speed or amplitude changes along the record, an ageing actuator behind a lag
-reaches 6.8, and one whose loop widens by half 11: there, twice that is asked for."""
+"""[standard deviations] Limits above which a skew is examined closely, and reported; with 10 degrees of freedom, chance
+exceeds 6 in one of 8000 records. If the drive's speed or amplitude changes along the record, an ageing actuator behind
+a lag reaches 6.8, and one whose loop widens by half 11: for such records the limit is doubled."""
 
 STRAIGHT = 0.9
 """The line explains more than this fraction of the variance of the sections' delays beyond their errors."""
 
 UNLIKE = 0.05
-"""[fraction] Sections whose drive differs by more than this in speed or amplitude may differ in delay for that."""
+"""[fraction] Sections whose drive differs by more than this in speed or amplitude may differ in delay for that
+reason."""
 
 LONG = 40.0
-"""[turns of the drive] In longer records the delay may grow beyond what a linear fit sees: their beginning goes
+"""[turns of the drive] In longer records the delay may grow beyond the reach of a linear fit: their beginning is fitted
 first."""
 
 STEPS, NEAR = 8, 0.3
-"""[secants] Most that are taken, and [standard deviations] the growth that may remain."""
+"""[secant steps] Maximum number, and [standard deviations] the growth that may remain."""
 
 FEWEST = 240
 """[samples] Shorter records show no skew."""
@@ -71,7 +72,7 @@ class Skew:
     half: float
 
     def sentence(self, record: Record) -> str:
-        """What was found, without what is done about it."""
+        """The finding, without the correction."""
         grows = abs(self.slope) * float(record.t[-1] - record.t[0])
         what = "falls behind v" if self.slope > 0.0 else "runs ahead of v"
         return (
@@ -81,7 +82,7 @@ class Skew:
 
 
 AUTO = "auto"
-"""The skew that is asked for where it is to be that of the records."""
+"""The value that asks for the skew found in each record."""
 
 
 def checked(asked: float | str | None) -> float | str | None:
@@ -97,7 +98,7 @@ def checked(asked: float | str | None) -> float | str | None:
 
 
 def told(record: Record, asked: float | str | None) -> Record:
-    """The record with a note about its skew, and without it if that is `asked`: in ppm, or `auto` for its own."""
+    """The record with a note about its skew, which is removed if `asked`: a number of ppm, or `auto` for its own."""
     if asked is None or asked == AUTO:
         found = skew(record)
         if found is None:
@@ -118,7 +119,7 @@ def told(record: Record, asked: float | str | None) -> Record:
 
 
 def skew(record: Record) -> Skew | None:
-    """The skew of a record's clocks, None if there is none that is significant."""
+    """The skew of a record's clocks, None if no significant skew is found."""
     if record.y is None or not record.timed or len(record) < FEWEST or len(record.v) != len(record):
         return None
     t, v, y = (np.asarray(x, dtype=np.float64) for x in (record.t, record.v, record.y))
@@ -154,7 +155,7 @@ def skew(record: Record) -> Skew | None:
 
 
 def _settled(t: Array, v: Array, y: Array, slope: float) -> tuple[float, _Growth] | None:
-    """The slope behind whose correction no growth remains, by secants, and the rest; None if there is none."""
+    """The slope whose correction leaves no growth, by secants, and the remaining growth; None if not found."""
     before: tuple[float, float] | None = None
     for _ in range(STEPS):
         if not abs(slope) <= LARGEST:
@@ -216,7 +217,7 @@ def _growth(t: Array, v: Array, y: Array, most: int) -> _Growth | None:
     if np.ptp(y[some]) == 0.0:
         return None
     delayed = -speed[:, None] * (section[:, None] == np.arange(SECTIONS))
-    # the sections' delays beside everything else: project that out of both sides
+    # fit the sections' delays beside everything else: project the rest out of both sides
     basis, *_ = np.linalg.svd(drifting / np.maximum(np.linalg.norm(drifting, axis=0), 1e-300), full_matrices=False)
     inner = delayed - basis @ (basis.T @ delayed)
     target = y[some] - basis @ (basis.T @ y[some])

@@ -9,7 +9,7 @@ from hystgen.records import Record
 
 
 def put_right(records: Sequence[Record], clock_skew: float | str | None = None) -> list[Record]:
-    """The records with lasting steps of y bridged and skewed clocks told, as a note of each record says.
+    """The records with lasting steps of y bridged and clock skews reported, as a note of each record says.
 
     `clock_skew`: growth of the delay of y after v that is taken out, in ppm of time, or `auto` for that of each record.
     """

@@ -1,8 +1,9 @@
-"""Steps of the output that last: an interferometer that slips by a fringe, a counter that wraps.
+"""Lasting steps of the output: an interferometer that slips by a fringe, a counter that wraps.
 
 From one sample to the next the output moves by far more than its surroundings and the drive explain, and it stays
-there. A model's offset would have to change at that sample; instead, the output behind it is moved back. A drop-out
-returns, an actuator's own jump goes where the drive pushes it and is undone on the way back: neither is a lasting step.
+there. A model's offset would have to change at that sample; instead, the output from there on is shifted back. A
+drop-out returns; an actuator's own jump goes where the drive pushes it and is undone on the way back. Neither is a
+lasting step.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ GRAINS = 4.0
 """[steps of the recorded numbers] A smaller step may come from the converter alone."""
 
 EXPLAINED = 0.25
-"""[fraction of the step] If the drive jumps enough for more than this, the step is the actuator's answer to it."""
+"""[fraction of the step] If a jump of the drive accounts for more than this, the step is the actuator's response."""
 
 AGREES = 0.5
 """[fraction of the step] A step lasts if a fit to the whole record finds it as large as its neighbours do, within this,
-and is not off by more than this inverted elsewhere: an isolated fault has 0 there, and so has a jump that is made up
-for."""
+and is not off by more than this inverted elsewhere: an isolated fault has 0 there, and so has a jump that is later
+undone."""
 
 RATE, USUAL = 0.5, 0.9
 """Where the drive's rate changes by more than this fraction of its quantile `USUAL`, a step may be due to that."""
@@ -46,25 +47,27 @@ ALONG = 0.9
 """More than this fraction of the actuator's own jumps go with the drive, up and down."""
 
 NEARBY, RECURS = 0.1, 0.25
-"""[fraction of the drive's range] Its own jumps recur within this of each other, in more than a quarter of the drive's
-passes: some stay out where a smaller loop does not undo the jump before."""
+"""[fraction of the drive's range] The actuator's own jumps recur within this distance of each other, in more than a
+quarter of the drive's passes: some are missing where a smaller loop does not undo the jump before."""
 
 MOST = 50
-"""Largest number of steps in a record; more belong to the actuator, or to a sensor of no use."""
+"""Largest number of steps in a record; more belong to the actuator, or to a useless sensor."""
 
 PLAYS = 12
 """Number of plays in the fit to the whole record."""
 ROWS = 4000
-"""[samples] Compared in that fit."""
+"""[samples] Number compared in that fit."""
 
 NEAR = 30
-"""[samples] On either side of a step, this many errors of that fit give its size; fewer up to the next step or turn."""
+"""[samples] The size of a step comes from this many errors of that fit on either side, or fewer up to the next step or
+turn."""
 
 WHOLE_RANGE = 0.5
 """[fraction of the output's range] Larger jumps may be those of a wrapped counter."""
 
 MODULUS = 0.02
-"""[fraction of the range that a counter wraps at] Jumps whose sizes differ by more than this are not of one counter."""
+"""[fraction of the range that a counter wraps at] Jumps whose sizes differ by more than this do not come from one
+counter."""
 
 LEFT = 0.25
 """[fraction of the rms error] A fit to the unwrapped output leaves less than this of the error with the jumps."""
@@ -83,13 +86,13 @@ class Steps:
     modulus: float | None = None
 
     def bridged(self, y: Array) -> Array:
-        """The output (N,) with everything behind each step moved back."""
+        """The output (N,) with everything after each step shifted back."""
         moved = np.zeros(len(y))
         moved[self.at] = self.sizes
         return np.asarray(y - np.cumsum(moved))
 
     def sentence(self, record: Record) -> str:
-        """What happened where, and what was done about it."""
+        """The place and kind of the steps, and the correction."""
         unit = f" {record.units['y']}" if record.units.get("y") else ""
         first = int(self.at[0])
         place = f"sample {first} (t = {record.t[first]:.6g} s)" if record.timed else f"sample {first}"
@@ -197,10 +200,10 @@ def _slips(v: Array, y: Array, move: Array) -> Steps | None:
         if lasting.all():
             break
         at = at[lasting]
-        if len(at) <= 0.5 * sudden:  # most jumps are made up for: so may be the others
+        if len(at) <= 0.5 * sudden:  # most jumps are undone later, so the others may be too
             return None
     found = Steps(at + 1, _sizes(v, y, at))
-    # what remains must be a motion: of an output that only jumps, nothing would
+    # the rest must be a motion; an output that only jumps leaves none
     return found if float(np.sum(np.abs(found.sizes))) < float(np.ptp(found.bridged(y))) else None
 
 
@@ -242,13 +245,13 @@ def _sudden(v: Array, y: Array, move: Array) -> Indices:
     pushed = np.abs(slope * (drive[some] - _local(drive, some)))
     sudden = (excess > least) & (excess > CLEAR * np.max(others, axis=1)) & (pushed < EXPLAINED * excess)
     at = some[sudden]
-    # where the drive's rate jumps, what depends on it does too, as the voltage of a cell whose current turns
+    # where the drive's rate jumps, a rate-dependent output does too, as the voltage of a cell when its current reverses
     ahead, behind = (_median(drive, at[:, None] + side) for side in (np.arange(-AROUND, 0), np.arange(1, AROUND + 1)))
     return np.asarray(at[np.abs(behind - ahead) < RATE * float(np.quantile(np.abs(drive), USUAL))])
 
 
 def _without_returns(at: Indices, move: Array, samples: int) -> Indices:
-    """The steps without those that a step of the same size takes back soon, as at the end of a drop-out."""
+    """The steps without those that a step of the same size soon reverses, as at the end of a drop-out."""
     soon = min(faults.LONGEST_DROP_OUT, samples // 20)
     kept, k = [], 0
     while k < len(at):

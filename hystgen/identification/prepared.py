@@ -25,7 +25,7 @@ LEAST_SOUND = 0.1
 """Smallest fraction of a record that must remain once the samples at the ends of a converter's range are removed."""
 
 MUCH_LESS = 0.5
-"""[fraction of the drive's range] If less than this is left behind a skipped start, a warning says so: plays need at
+"""[fraction of the drive's range] If less than this is left after a skipped start, a warning says so: plays need at
 least half the range to move out of any state."""
 
 MOST_FITS = 4

@@ -35,7 +35,7 @@ MOST_NAMED = 3
 
 
 class UselessError(IdentificationError):
-    """A model that is of no use, asked for with `strict`; `str()` says why."""
+    """A model that is of no use, raised with `strict`; `str()` says why."""
 
 
 @dataclass(frozen=True)

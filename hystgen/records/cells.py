@@ -34,10 +34,10 @@ NANO = 10**9
 HOUR = 3600 * NANO
 
 SLOWEST = 600 * NANO
-"""[ns] Clocks are watched for a change of summer time only at steps below this, where an hour cannot be a pause."""
+"""[ns] A change of summer time is looked for only at steps below this, where an hour cannot be a pause."""
 
 CHANGED_WITHIN = 3
-"""[steps] How long after the full hour the first time behind a change of summer time may be."""
+"""[steps] How long after the full hour the first time after a change of summer time may be."""
 
 PAST_MIDNIGHT = 0.5
 """[days] A clock without a date that jumps back by at least this much has passed midnight."""

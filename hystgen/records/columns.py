@@ -35,7 +35,7 @@ TIMES: dict[str, tuple[float, float]] = {
 """Factor and divisor to get seconds: x/1000 is the double nearest to the intended time; 0.001*x may not be."""
 
 NEVER_THE_START = 1e4
-"""[days] Counts of days as large as this are dates: 27 years after a start there is no record of one."""
+"""[days] Day counts as large as this are dates: no record lasts 27 years."""
 
 _ONE = (
     r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
@@ -105,7 +105,7 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     if factor == divisor:
         return t, ""
     dated = _of_time(unit) in DAYS and len(t) > 0 and np.nanmin(t) > NEVER_THE_START
-    # From the first day on, since the seconds of all days before it would round the fraction of a day away
+    # Counted from the first day, since the seconds of all days before it would round away the fraction of a day
     seconds = (t - np.nanmin(t) if dated else t) / divisor
     seconds *= factor
     more = " from the first" if dated else ""
@@ -265,7 +265,7 @@ _DATED = re.compile(r"(?i)date|datum|fecha|serial|excel|(?:^|[^a-z])days?(?:[^a-
 
 
 def counted_days(t: Array, name: str) -> str:
-    """What is counted if a time (N,) without a unit counts days, in words; empty if it does not; `DOUBTFUL`.
+    """The kind of day count of a time (N,) without a unit, in words; empty if it counts no days; or `DOUBTFUL`.
 
     `name`: the column's, which may say that it is a date.
     """
@@ -490,7 +490,7 @@ class Finder:
 
     def _meant(self, ours: str, found: Mapping[str, Column], folders: Set[str] = frozenset()) -> Column | None:
         """The only column whose name means `ours`; else, for a time, the first or only column with a unit of time, and
-        for a reference a position with nothing beside it but time, since a file with a drive is a recording."""
+        for a reference a position if the only other column is time, since a file with a drive is a recording."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
         meant = [c for c in free if meaning(c) == ours]

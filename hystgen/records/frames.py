@@ -1,4 +1,4 @@
-"""Signals of calls: samples, or a data frame or mapping with a column of them, and answers in their kind."""
+"""Signals of calls: samples, or a data frame or mapping with a column of them, and answers of the same kind."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def read_igor(reading: Reading, stream: IO[bytes]) -> Table:
         raise reading.uninstalled("Igor", "igor2", "CSV", "instruments") from None
     with reading.parsing("an Igor binary wave"), unlogged("igor2"):
         data = stream.read()
-        if not is_igor(data) or not _is_whole(data):  # igor2 would make arrays of any size that it finds there
+        if not is_igor(data) or not _is_whole(data):  # igor2 would allocate any size that the file states
             raise reading.refuse("is an Igor binary wave that is damaged or cut off; save it again")
         wave = binarywave.load(io.BytesIO(data))["wave"]
         head = wave["wave_header"]
@@ -58,7 +58,7 @@ def is_igor(start: bytes) -> bool:
 
 
 def _is_whole(data: bytes) -> bool:
-    """Whether a file has as many bytes as its header says for its parts, of which there are 15 in version 5."""
+    """Whether a file has as many bytes as its header states for its parts, of which there are 15 in version 5."""
     order = "<" if data[1] == 0 else ">"
     (version,) = struct.unpack(f"{order}h", data[:2])
     if version != 5:

@@ -15,7 +15,7 @@ from hystgen.records.reading import SAME_STEP, Reading, Table
 from hystgen.records.record import Array
 
 MARK = "+"
-"""Between the files of one record."""
+"""Separator between the files of one record."""
 
 WITHIN = 0.5
 """[steps] Largest difference between the times of two channels: further apart, they are of different samples."""
@@ -25,7 +25,7 @@ _SAME = "export the same samples of each"
 
 
 def files(source: str) -> list[str]:
-    """The files of a record: one, or several with a plus sign between them where there is no file of the whole name."""
+    """The files of a record: one, or several with a plus sign between them if no file has the whole name."""
     if MARK not in source or os.path.lexists(source):
         return [source]
     parts = source.split(MARK)

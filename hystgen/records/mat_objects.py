@@ -21,7 +21,7 @@ TYPE: Mapping[str, str] = {
     "datetime": f"s.t = seconds({{name}} - {{name}}(1)); {_SAVE}",
     "duration": f"s.t = seconds({{name}}); {_SAVE}",
 }
-"""What to type in MATLAB to save an object of a class as vectors; to its first result, others can be added."""
+"""MATLAB commands that save an object of a class as vectors; others can be added to the first result."""
 
 OTHERWISE = 's.v = ..; s.y = ..; save("{file}", "-struct", "s")'
 

@@ -58,7 +58,7 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
 
 
 def _opened(library: Callable[[str], File], path: str) -> File | None:
-    """The file; None if it is damaged, where the library's object fails again on deletion, here in silence."""
+    """The file; None if it is damaged: the library's object then fails again on deletion, here in silence."""
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         return library(path)

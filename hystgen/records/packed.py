@@ -48,11 +48,11 @@ _DAMAGE = (
 )
 
 _DOCUMENTS = ("xl/workbook.xml", "xl/workbook.bin", "word/document.xml", "mimetype")
-"""Files by which a zip archive is a document of an office program."""
+"""Files that mark a zip archive as an office document."""
 
 
 def location(file: str) -> tuple[str, str]:
-    """The path of a file that exists, and the part of it that is named behind it, `runs.zip` and `sweep.csv`."""
+    """The path of a file that exists, and the part named after it, as `runs.zip` and `sweep.csv`."""
     path, part = file, ""
     while path and not os.path.lexists(path):
         path, _, name = path.rpartition("/")
@@ -100,7 +100,7 @@ Members = Mapping[str, Callable[[], IO[bytes]]]
 
 
 def _zipped(stack: ExitStack, stream: IO[bytes], name: str) -> Members | None:
-    """The files in a zip archive; None for a file that only is one inside: an `.npz`, a workbook."""
+    """The files in a zip archive; None for a format that only uses zip inside: an `.npz`, a workbook."""
     if name.lower().endswith(".npz"):
         return None
     try:

@@ -1,4 +1,4 @@
-"""What is said about how files were read."""
+"""Notes on how files were read."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ actuator has hundreds of samples for each of its loops, which would then take mi
 
 
 def time_without_unit(records: Sequence[Record], given: float | None) -> str:
-    """A sentence about times without a unit that are slow as seconds; empty if there are none. `given`: a sample time
-    that the user gives."""
+    """A sentence about times without a unit that would be slow in seconds; empty if there are none. `given`: a sample
+    time that the user gives."""
     unnamed = [each for each in records if len(each) > 1 and each.timed and "t" not in each.units]
     slow = [each for each in unnamed if each.sample_time >= SLOW]
     if not slow or given is not None:

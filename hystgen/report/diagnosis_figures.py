@@ -143,8 +143,8 @@ def overlay(found: Diagnosis, width: float) -> Figure:
 
 
 def deviation(found: Diagnosis, width: float) -> Figure:
-    """Measured, by speed, and predicted over the drive, less the straight line, and the error below: before and after
-    side by side on one scale."""
+    """Measured, by speed, and predicted against the drive, with the straight line removed, and the error below: before
+    and after side by side on one scale."""
     each, units, unit = worst(found)[0], found.parameters.units, found.result.unit
     sides = _sides(found)
     wide = width == WIDE or len(sides) == 1
@@ -241,7 +241,7 @@ def _named(found: Diagnosis) -> list[Effect]:
 
 
 def stops(found: Diagnosis, width: float) -> Figure:
-    """Motion after the drive has stopped over the logarithm of time, measured, and with and without the effects."""
+    """Motion after the drive has stopped, on a logarithmic time axis: measured, with and without the effects."""
     holds, unit = _holds(found), found.result.unit
     wide = width == WIDE
     drawn = drawing.figure(width, 3.6 if wide else 3.0 * len(holds))

@@ -279,8 +279,8 @@ def weight_panel(axes: Axes, fit: Fit, units: Units, places: Sequence[int]) -> N
 
 
 def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
-    """Measured and modelled loops for a fitted record and a held-out record, and beside them the same loops less their
-    straight line, coloured by speed."""
+    """Measured and modelled loops for a fitted record and a held-out record, and beside them the same loops with the
+    straight line removed, coloured by speed."""
     pair, units = drawn_ones(shown), fit.parameters.units
     rows, columns = (len(pair), 2) if wide else (2 * len(pair), 1)
     figure = drawing.figure(9.6, 4.2 * rows) if wide else drawing.figure(4.4, 3.9 * rows)

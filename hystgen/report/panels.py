@@ -22,8 +22,8 @@ FASTEST = 0.98
 """[quantile] Faster samples have the last colour, so that a few steps do not leave one colour for all else."""
 
 STRETCHES = 25
-"""[of a record] The worst stretch is one of so many: long enough for the course of the error, short enough that the
-motion within does not hide it."""
+"""[of a record] The worst stretch is one of this many: long enough to show the course of the error, short enough that
+the motion within does not hide it."""
 
 LEAST = 32
 """[samples] Minimum length of that stretch."""
@@ -151,7 +151,7 @@ def mains(hertz: Array) -> list[float]:
     """Frequencies of the mains and their multiples that a spectrum resolves; empty if it cannot tell them apart."""
     if abs(MAINS[1] - MAINS[0]) < APART * float(hertz[0]):
         return []
-    last = float(hertz[-1]) - APART * float(hertz[0])  # nothing is told from the end of the spectrum
+    last = float(hertz[-1]) - APART * float(hertz[0])  # the end of the spectrum is not judged
     return sorted({k * each for each in MAINS for k in range(1, HARMONICS + 1) if k * each < last})
 
 

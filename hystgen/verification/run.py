@@ -19,7 +19,7 @@ from hystgen.verification.report import Report, Row
 from hystgen.verification.targets import AVR, HOST, Board, find
 
 CODES = 3_000
-"""[samples] Most steps from code to code; the reference takes about 0.1 ms for each."""
+"""[samples] Maximum number of steps from code to code; the reference takes about 0.1 ms for each."""
 
 
 @arguments.checked

@@ -115,7 +115,7 @@ WRITTEN = {
 
 
 EXPLAINED_IN = "docs/plants.md explains it"
-"""Where hysteresis that is no play sum is described."""
+"""Where hysteresis that is not a play sum is described."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from hystgen.identification.pi import IdentificationError
 
 
 def check(names: Sequence[str], user: Sequence[type[Effect]], there: Collection[str]) -> None:
-    """Raise ValueError, with one message, for a name that is no effect, that repeats, or that the model already has.
+    """Raise ValueError, with one message, for a name that is not an effect, is repeated, or is already in the model.
 
     `user`: the user's own effects; `there`: names of what the nominal model contains.
     """

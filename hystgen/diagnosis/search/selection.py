@@ -138,8 +138,8 @@ def chance(now: Fitted, best: Tried, records: Records) -> float:
 def _beside_rates(now: Fitted, best: Tried) -> bool:
     """Whether an effect is an element next to plays that depend on the rate.
 
-    Friction has more laws of rates than the catalogue: what a rate dependence leaves of another one changes loops, as
-    an element does. Next to it, an element has merit only if it takes most of the error.
+    Friction has more rate laws than the catalogue: the residual of one law fitted with another changes loops, as an
+    element does. Next to a rate dependence, an element has merit only if it removes most of the error.
     """
     return best.option.name == effects.PARALLEL and any(
         type(effect).moves_plays() for effect in now.structure.effects(now.shape)
@@ -924,10 +924,10 @@ def _exchanged(
 
 
 def _look_alikes(name: str) -> list[str]:
-    """Effects that make the output lag, if this is one of them; each is searched for in the place of the others.
+    """Effects that make the output lag, if this is one of them; each is tried in place of the others.
 
-    Which of them is there may show only once the other effects are known: next to an element of the wrong shape, or
-    without one, a lag can be among the best of no round.
+    The right one may show only once the other effects are known: next to an element of the wrong shape, or without an
+    element, a lag may never be among the best of a round.
     """
     lagging = [each for each in effects.CATALOGUE if effects.shapes(each)[0].rank < math.inf]
     return lagging if name in lagging else []

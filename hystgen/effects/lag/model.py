@@ -43,7 +43,7 @@ class Lag(Effect):
 
     @property
     def corner(self) -> tuple[float, str] | None:
-        """Where the gain has fallen to 0.71."""
+        """The frequency at which the gain has fallen to 0.71."""
         return (1.0 / (2.0 * math.pi * self.time_constant), "corner") if self.time_constant > 0.0 else None
 
     def drive(self, a: Array, run: Run) -> Array:
