@@ -40,7 +40,8 @@ class _Holding(click.Command):
 @click.argument("params", nargs=-1, required=True, type=click.Path())
 @click.option(
     "--holdout", multiple=True, type=click.Path(), callback=common.matched,
-    help="record to compare on, best one that no model was fitted to; or a pattern in quotes, 'held/*.csv'; repeatable",
+    help="record to compare on, preferably one that no model was fitted to; or a pattern in quotes, 'held/*.csv'; "
+    "repeatable",
 )
 @click.option("-o", "output", type=click.Path(file_okay=False), help="folder for a page, its picture and the JSON")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the deviations, on one scale")
@@ -55,7 +56,7 @@ def compare(
 ) -> None:
     """Show models side by side on records: how far each is from the measured motion, and which is the closest.
 
-    A straight line comes first, as the baseline. Models that the records cannot tell apart are said to be so.
+    A straight line comes first, as the baseline. Says which models the records cannot tell apart.
 
     Example: hystgen compare plain.yaml diagnosis/params.yaml --holdout other.csv -o comparison/
     """

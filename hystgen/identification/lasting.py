@@ -111,8 +111,8 @@ class Steps:
             more = f" and {len(self.at) - 4} more" if len(self.at) > 4 else ""
             what = f"y steps by {sizes[0]} at {place}, {', '.join(some)}{more}, and stays there"
         return (
-            f"{what} although the drive moves on evenly, as a sensor does that slips by a fringe or is zeroed anew; "
-            "bridged by an offset behind each step"
+            f"{what} although the drive moves on evenly, like a sensor that slips by a fringe or is zeroed again; "
+            "bridged by an offset after each step"
         )
 
 

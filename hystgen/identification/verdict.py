@@ -98,7 +98,8 @@ def verdict(
     if not held:
         return Verdict("untold", "nothing was held out, so the error on other records is unknown")
     if line <= least and noise > little:
-        return Verdict("untold", f"a straight line is off by {line:.3g}{u} rms, mere noise: no hysteresis shows")
+        plain = f"a straight line is off by {line:.3g}{u} rms, which is only noise"
+        return Verdict("untold", f"{plain}: no hysteresis is visible")
     return Verdict("good", f"{off}, which is noise")
 
 

@@ -89,7 +89,7 @@ BY_BYTES: Mapping[bytes, Reader] = {
 """Readers by the bytes that a file begins with."""
 
 FOREIGN: Mapping[bytes, str] = {
-    b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": "is an Excel workbook of before 2007 (.xls); save it as .xlsx or CSV",
+    b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1": "is a pre-2007 Excel workbook (.xls); save it as .xlsx or CSV",
     b"\x28\xb5\x2f\xfd": "is packed with Zstandard; unpack it with zstd -d",
     b"7z\xbc\xaf\x27\x1c": "is a 7-Zip archive; unpack it, or pack it as zip",
     b"Rar!\x1a\x07": "is a RAR archive; unpack it, or pack it as zip",
