@@ -60,7 +60,7 @@ check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# All proofs by Frama-C, which has to be installed; `make check` does a third of them
+# All proofs by Frama-C, which has to be installed; `make check` does a fifth of them
 prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 

@@ -400,6 +400,7 @@ def test_both_operators_follow_the_model(effect: str, arithmetic: str) -> None:
     assert np.max(np.abs(one.simulate(sent) - references)) < allowed + slopes * units[0] * (units[0] < 1.0)
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("effect", [TWO, TILTED])
 def test_a_dithered_rest_gathers_no_error(effect: str, arithmetic: str) -> None:

@@ -289,6 +289,7 @@ def test_a_full_disk_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert compiled_once()[0] == 3.0
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense", "TkAgg", ""])
 @pytest.mark.thorough
 def test_a_backend_from_a_notebook_is_no_matter(backend: str) -> None:
@@ -316,6 +317,7 @@ def test_a_home_folder_that_cannot_be_written_to_makes_no_noise() -> None:
     assert Path("a.png").exists()
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough
 @pytest.mark.parametrize("home", ["/dev/null/home", "/proc/none"])
 def test_zig_builds_without_a_home_folder(home: str) -> None:

@@ -257,6 +257,7 @@ def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monk
             assert met[1] <= comparisons <= 2 * met[1], (words, met)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("n", [1, 16, 64])
 @pytest.mark.parametrize("operation", ["forward", "inverse"])
 @pytest.mark.parametrize("front", FRONTS)

@@ -365,6 +365,7 @@ def test_the_sentence_is_about_what_is_most_of_the_error(
     assert "a line at 50 Hz" in said
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("bent", "names"), [(2e-4, 1), (2e-3, 0)])
 def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> None:

@@ -299,6 +299,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits.drive.high[0]
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
@@ -502,6 +503,7 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=8)
 @BOTH
 @pytest.mark.parametrize("name", STILL)

@@ -336,6 +336,7 @@ def test_a_worker_of_another_version_is_reported(few: Path) -> None:
     )
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize(
     ("sent", "jobs"),
     [(signal.SIGINT, 2), (signal.SIGINT, 1), (signal.SIGKILL, 1)],

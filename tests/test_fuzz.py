@@ -107,6 +107,7 @@ def out_of_bounds(text: str) -> str:
     return found
 
 
+@pytest.mark.slow(one_in=2)
 @needs_clang
 @pytest.mark.parametrize(
     ("change", "said"),

@@ -457,6 +457,7 @@ class TestIntervals:
         assert "    # 95 %: 0." in text
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("front", [np.asarray, bent])
 @pytest.mark.thorough
 def test_an_unknown_history_costs_little(front: Callable[[Array], Array]) -> None:

@@ -221,6 +221,7 @@ def assert_same_bits(x: np.ndarray, one: np.ndarray, other: np.ndarray) -> None:
 # --- C and Python -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("optimisation", ["-O0", "-O2", "-O3"])
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", FORMATS)

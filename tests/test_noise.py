@@ -121,6 +121,7 @@ def test_no_narrower_averages_hold_the_gain(effects: tuple[str, ...], limit: flo
     np.testing.assert_allclose(found.row, rows(found.times, found.width, found.centred), atol=1e-12)
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("preview", [None, 0, 1, 4, 30])
 def test_the_motion_is_as_late_as_printed(preview: int | None) -> None:
     """On a ramp, the delay is measured against the motion without averages."""

@@ -177,6 +177,7 @@ class TestHysteresis:
 class TestEffects:
     """Each effect follows its own law and is large enough to be found."""
 
+    @pytest.mark.slow(one_in=2)
     @pytest.mark.parametrize("seed", range(13), ids=NAMES)
     def test_leaves_what_no_play_sum_absorbs(self, made: Made, seed: int) -> None:
         found = made("single", seed)

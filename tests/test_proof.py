@@ -354,6 +354,7 @@ def run(folder: Path, one: Model, arithmetic: str, sums: int = 1) -> str:
     return said
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 @pytest.mark.parametrize("name", [*(name for name in FILES if name != "linear"), "sixteen", "many"])
 def test_what_the_proof_of_corners_takes_for_granted_holds(name: str, arithmetic: str, tmp_path: Path) -> None:

@@ -119,6 +119,7 @@ def test_the_index_would_take_both(dist: Path, wheel: Path) -> None:
     assert run(Path(sys.executable).with_name("check-wheel-contents"), wheel, folder=dist).stdout.endswith("OK\n")
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize(("name", "options"), [
     ("plain", []),
