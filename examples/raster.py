@@ -37,13 +37,16 @@ Array = NDArray[np.float64]
 Drive = Callable[[float], float]
 
 CORNER, SIZE = 8.0, 10.0
-"""[um] Start of the image on both axes, and its width and height."""
+"""[um] Start of the image on both axes, and its width and height: inside the range of the sweep, with room for what
+errors add."""
 
 LINES, SAMPLES = 24, 100
-"""Lines of the image, and samples of a line, to and fro: 1 s."""
+"""Lines of the image, and samples of a line, to and fro: 1 s, at which creep acts within a line; few enough for the
+example to take seconds."""
 
 REACH, SWEEP = (6.0, 20.0), 200
-"""[um] Range of the sweep before the image, and samples of each of its three parts."""
+"""[um] Range of the sweep before the image, which wipes out the memory of all that the image can reach, and samples of
+each of its three parts: 2 s, no faster than the image."""
 
 START = 3 * SWEEP
 """Samples before the image."""

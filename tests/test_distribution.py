@@ -848,7 +848,7 @@ def test_the_command_writes_the_unit(run: Run, tmp_path: Path, monkeypatch: pyte
 
 def test_the_gateway_for_octave_has_the_bits_of_the_reference(run: Run, tmp_path: Path) -> None:
     """examples/mex: its script compares two instances with each other; its drives are compared here."""
-    if shutil.which("mkoctfile") is None:
+    if shutil.which("mkoctfile") is None:  # CI does not install it: two minutes for one example, run by hand instead
         pytest.skip("Debian's octave-dev is not installed; examples/mex/README.md says what was run by hand")
     folder = tmp_path / "mex"
     shutil.copytree(Path(__file__).parents[1] / "examples" / "mex", folder)

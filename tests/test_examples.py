@@ -51,7 +51,7 @@ def test_the_demo_installs_zig_only_where_no_compiler_works(
 
 def test_the_demo_takes_a_real_compiler() -> None:
     if not (shutil.which("gcc") or shutil.which("clang")):
-        pytest.skip("there is no compiler")
+        (pytest.fail if os.environ.get("CI") else pytest.skip)("neither gcc nor clang is installed")
     done = subprocess.run(["make", "-n", "demo", "VENV=nowhere"], cwd=ROOT, capture_output=True, text=True, check=True)
     assert "pip install" in done.stdout
     assert "zig" not in done.stdout
@@ -79,11 +79,12 @@ def story(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.mark.thorough
 def test_from_a_gap_to_firmware(story: tuple[Path, str]) -> None:
-    """The figures of the README, and the files that the demo names."""
+    """The figures of the pages, and the files that the demo names."""
     folder, said = story
     assert "Missing: asymmetry, creep." in said
     errors = [float(number) for number in re.findall(r"([\d.]+) % of the motion, rms", said)]
-    np.testing.assert_allclose(errors, [6.88, 0.85, 0.02], rtol=0.1)
+    # rounded to two digits on the pages, to three places in what is printed
+    np.testing.assert_allclose(errors, [6.88, 0.85, 0.02], rtol=0.0, atol=0.005 + 0.0005)
     assert (folder / "tracking.png").read_bytes().startswith(b"\x89PNG")
     assert "creep" in (folder / "diagnosis" / "report.html").read_text()
     assert {path.name for path in (folder / "firmware").iterdir()} >= {"plain.c", "extended.c"}

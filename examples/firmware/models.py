@@ -19,7 +19,7 @@ import hystgen
 from hystgen.parameters.files import dump_parameters
 
 HERE = Path(__file__).resolve().parent
-RATE = 20_000  # Hz, as in board.h
+RATE = int((HERE / "board.h").read_text(encoding="utf-8").partition("#define BOARD_RATE ")[2].split()[0])  # Hz
 SEEDS = {"x": 1, "y": 1000}  # as in main.c
 UNITS = {"input": "V", "output": "um"}
 CONVERTERS = """\

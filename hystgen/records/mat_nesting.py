@@ -6,6 +6,7 @@ elements are therefore walked here first, in the order in which scipy reads them
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 import zlib
@@ -32,6 +33,9 @@ CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
 COMPLEX = 0x800
 """Flag of an array with an imaginary part."""
 
+DAMAGED = (EOFError, ValueError, ZeroDivisionError, zlib.error)
+"""Raised where an element is truncated or damaged."""
+
 PIECE = 1 << 16
 """[bytes] Amount read or unpacked at a time."""
 
@@ -41,50 +45,47 @@ def problem(stream: IO[bytes]) -> str:
 
     An element that is truncated or not an array stops the walk; scipy stops there as well, with a message.
     """
-    stream.seek(0)
-    head = stream.read(HEADER)
-    if len(head) < HEADER or 0 in head[:4]:  # version 4, which holds only numbers
-        return ""
-    order = "<" if head[126:127] == b"I" else ">"
-    place = HEADER
-    while len(tag := stream.read(8)) == 8:
-        kind, size = struct.unpack(f"{order}II", tag)
-        place += 8 + size
-        elements = _Elements(stream if kind != COMPRESSED else _Unpacked(stream, size), order)
+    for elements in _variables(stream):
         try:
-            if kind == COMPRESSED:
-                elements.matrix()
             if any(depth > MOST for depth in elements.depths()):
                 return f"structs or cells nested more than {MOST} deep"
         except OverflowError:
             return f"an array of more than {MANY} structs or cells"
-        except (EOFError, ValueError, ZeroDivisionError, zlib.error):
+        except DAMAGED:
             pass
-        stream.seek(place)
     return ""
 
 
 def objects(stream: IO[bytes]) -> dict[str, str]:
     """The variables that are objects, by name with their classes; the walk stops as in `problem`."""
+    found: dict[str, str] = {}
+    for elements in _variables(stream):
+        with contextlib.suppress(*DAMAGED):
+            found |= elements.named_object()
+    return found
+
+
+def _variables(stream: IO[bytes]) -> Iterator[_Elements]:
+    """The elements of each variable of a file, unpacked; none of a file of version 4, which holds only numbers."""
     stream.seek(0)
     head = stream.read(HEADER)
-    found: dict[str, str] = {}
     if len(head) < HEADER or 0 in head[:4]:
-        return found
+        return
     order = "<" if head[126:127] == b"I" else ">"
     place = HEADER
     while len(tag := stream.read(8)) == 8:
         kind, size = struct.unpack(f"{order}II", tag)
         place += 8 + size
         elements = _Elements(stream if kind != COMPRESSED else _Unpacked(stream, size), order)
-        try:
-            if kind == COMPRESSED:
+        sound = True
+        if kind == COMPRESSED:
+            try:
                 elements.matrix()
-            found |= elements.named_object()
-        except (EOFError, ValueError, zlib.error):
-            pass
+            except DAMAGED:
+                sound = False
+        if sound:
+            yield elements
         stream.seek(place)
-    return found
 
 
 class _Unpacked:
