@@ -186,8 +186,8 @@ def timed_numbers(values: object) -> tuple[NDArray[np.generic] | None, bool]:
         return None, False
     if isinstance(values, np.ma.MaskedArray) and found.dtype.kind in "fiub":
         return np.ma.filled(values.astype(np.float64), np.nan), False
-    if found.dtype.kind == "O" and _are_times(values, found):
-        found = np.asarray(_in_utc(values), dtype="datetime64[ns]")
+    if found.dtype.kind == "O" and isinstance(next(iter(found.ravel().tolist()), None), datetime):
+        found = np.asarray(_in_utc(found), dtype="datetime64[ns]")
     if found.dtype.kind in "mM":
         known = found[~np.isnat(found)]
         origin = known[0] if found.dtype.kind == "M" and len(known) else np.timedelta64(0, "s")
@@ -201,19 +201,9 @@ def timed_numbers(values: object) -> tuple[NDArray[np.generic] | None, bool]:
     return (found if found.dtype.kind in "fiub" else None), False
 
 
-def _are_times(values: object, found: NDArray[np.generic]) -> bool:
-    """Whether the objects of an array are times, with a time zone or without."""
-    if getattr(getattr(values, "dtype", None), "kind", "") == "M":  # pandas, with a time zone
-        return True
-    first = next(iter(found.ravel().tolist()), None)
-    return isinstance(first, datetime)
-
-
-def _in_utc(values: object) -> object:
+def _in_utc(times: NDArray[np.generic]) -> list[object]:
     """Times without their time zones, which numpy does not know."""
-    if hasattr(values, "dtype") and values.dtype.kind == "M":
-        return values  # pandas converts them itself
     return [
         each.astimezone(UTC).replace(tzinfo=None) if isinstance(each, datetime) and each.tzinfo else each
-        for each in np.asarray(values).ravel().tolist()
+        for each in times.ravel().tolist()
     ]
