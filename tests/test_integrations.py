@@ -203,17 +203,29 @@ def test_an_unknown_tool_gets_one_message_and_nothing_is_written(
     assert not (tmp_path / "fw").exists()
 
 
-@pytest.mark.parametrize("name", ["test", "Install", "x"])
+@pytest.mark.parametrize(
+    ("name", "tools"), [("test", "meson"), ("Install", "meson"), ("m", "cmake"), ("x", "cmake,conan")]
+)
 def test_names_that_tools_use_themselves_are_refused(
-    name: str, run: Callable[..., tuple[int, str, str]], tmp_path: Path
+    name: str, tools: str, run: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
     path = tmp_path / "one.yaml"
     path.write_text(STAGE.replace("stage_x", name))
-    code, _, said = run("emit", path, "-o", tmp_path / "fw", "--integration", "meson")
+    code, _, said = run("emit", path, "-o", tmp_path / "fw", "--integration", tools)
     assert (code, len(said.splitlines())) == (2, 1)
     assert f"no --integration for a model called {name}: " in said
     assert not (tmp_path / "fw").exists()
     assert run("emit", path, "-o", tmp_path / "fw")[0] == 0
+
+
+def test_a_name_of_one_letter_is_refused_only_by_a_tool_that_refuses_it(
+    run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "one.yaml"
+    path.write_text(STAGE.replace("stage_x", "x"))
+    tools = ",".join(tool for tool in INTEGRATIONS if tool != "conan")
+    code, _, said = run("emit", path, "-o", tmp_path / "fw", "--integration", tools)
+    assert code == 0, said
 
 
 def test_files_of_another_origin_are_not_replaced(

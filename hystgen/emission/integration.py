@@ -44,8 +44,8 @@ WITH_SELFTEST = ("test/", "test_package/", "examples/")
 """Package folders that a shared run time lacks, since it has no self-test."""
 
 RESERVED = (
-    "all", "benchmark", "clean", "dist", "dl", "edit_cache", "gcc", "help", "install", "package", "package_source",
-    "rebuild_cache", "rt", "test", "uninstall", "util",
+    "all", "benchmark", "c", "clean", "dist", "dl", "edit_cache", "gcc", "help", "install", "m", "package",
+    "package_source", "rebuild_cache", "rt", "test", "uninstall", "util",
 )
 """Names of targets that the tools make themselves, and of system libraries, which a model's library would hide."""
 
@@ -68,12 +68,12 @@ class Package:
         return f"{self.name}_selftest.c" in self.code
 
 
-def name_problem(name: str) -> str | None:
-    """Why there can be no package of a model with this name; None if there can."""
-    if len(name) == 1:
-        reason = "conan requires two characters"
-    elif name.lower() in RESERVED:
+def name_problem(name: str, tools: Sequence[str]) -> str | None:
+    """Why these tools can have no package of a model with this name; None if they can."""
+    if name.lower() in RESERVED:
         reason = "build tools or systems use that name themselves"
+    elif len(name) == 1 and "conan" in tools:
+        reason = "conan requires two characters"
     else:
         return None
     return f"no --integration for a model called {name}: {reason}; rename it, for example axis_{name}"
@@ -84,7 +84,7 @@ def files(module: Module, code: Mapping[str, str]) -> dict[str, str]:
     same for all models. Raises ValueError for a name that the tools cannot use."""
     one = module.compensator
     name, options = one.names.name, one.options
-    if problem := name_problem(name):
+    if problem := name_problem(name, options.integration):
         raise ValueError(problem)
     shared = {file: text for file, text in code.items() if file.startswith("hystgen_")}
     own = {file: text for file, text in code.items() if file not in shared}
