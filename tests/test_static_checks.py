@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import static_checks
-from modelfiles import CHAINS, FILES, LED
+from modelfiles import CHAINS, CODED, FILES, LED
 from static_checks import MODULES, Finding, problems
 
 from hystgen.arithmetic import ARITHMETICS
@@ -75,7 +75,7 @@ def test_deviations_are_neither_missing_nor_left_over() -> None:
 
 def test_every_kind_of_module_is_looked_at() -> None:
     names, operators, arithmetics, engines, layouts = (set(column) for column in zip(*MODULES, strict=True))
-    assert names >= {"plain", "listed", "bent", "curved", "two_branches", "mixed", "linear"}
-    assert names <= {*FILES, *CHAINS, *LED}
+    assert names >= {"plain", "listed", "bent", "curved", "two_branches", "mixed", "linear", "coded"}
+    assert names <= {*FILES, *CHAINS, *LED, *CODED}
     assert operators == {"inverse", "forward", "both"}
     assert (arithmetics, engines, layouts) == (set(ARITHMETICS), set(ENGINES), set(LAYOUTS))
