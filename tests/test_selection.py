@@ -110,6 +110,16 @@ def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_m
     assert (further.merit is None) is (one_loop and one_speed)
 
 
+@pytest.mark.parametrize(("from_rest", "named"), [(0.3, True), (0.6, False)])
+def test_an_effect_that_needs_no_free_start_state_is_compared_without_it(from_rest: float, named: bool) -> None:
+    """Free start states alone leave as little as the effect with them, as in records with a single hold."""
+    now: Any = Made("now", 1, (1.0, 1.0), on_equal_terms=(0.3, 0.3))
+    creep: Any = Made("creep", 2, (0.3, 0.3), on_equal_terms=(from_rest, from_rest))
+    best = screening.Tried(SimpleNamespace(name="creep", front=False), creep, ("creep",), 0.3, creep.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(**{**vars(RECORDS), "terms": lambda one, _: [one, one]})
+    assert (selection.merit_of(now, best, records) is not None) is named
+
+
 HOLDS = slice(0, 400)
 """The samples of each made-up record in which the drive stands still."""
 
@@ -142,8 +152,9 @@ WITH_HOLDS.at_rest = at_rest
         (3.0, 1.0, 1.0, True),
         (3.0, 1.5, 1.5, True),  # more than noise, but most of what moves is explained
         (2.0, 1.6, 1.0, False),  # neither
-        (5.0, 2.2, 1.0, False),  # far above the noise
-        (5.0, 1.0, 2.2, False),
+        (20.0, 9.0, 9.0, True),  # far above the noise of a clean record
+        (5.0, 3.0, 1.0, False),  # less than most
+        (5.0, 1.0, 3.0, False),
         (1.1, 1.0, 1.0, False),  # hardly anything moves
     ],
 )

@@ -109,7 +109,7 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         return slow
     held, fitted = _removed(now, best, records)
     needed = _least(now) if least is None else least
-    at_rest = all(_explains_rest(each, k, records) for k, each in enumerate((held, fitted)))
+    at_rest = _explains_rest(held, fitted, records)
     if not (at_rest or _enough(held, fitted, needed, records.noise)):
         short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
         return Refusal("little", short.removed, needed * max(records.noise, short.left))
@@ -118,15 +118,25 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     ):
         return Refusal("most", held.left, rms(held.without))
     p_value = difference(held.without, held.errors)
-    if at_rest:
-        return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
+    if not at_rest and (by_chance := _by_chance(held, fitted)):
+        return by_chance
+    return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
+
+
+def _by_chance(held: _Removed, fitted: _Removed) -> Refusal | None:
+    """The refusal of an effect whose gain may be due to chance.
+
+    A gain that held-out records do not make certain must be certain on fitted ones. Chance does not halve an error to
+    which nothing was fitted.
+    """
+    p_value = difference(held.without, held.errors)
     if p_value > acceptance.P_REPEATED and held.left > acceptance.FAR_LESS * rms(held.without):
         return Refusal("chance", p_value, acceptance.P_REPEATED)
     if p_value > acceptance.P_SURE:
         of_fitted = difference(fitted.without, fitted.errors)
         if of_fitted > acceptance.P_SURE:
             return Refusal("unsure", of_fitted, acceptance.P_SURE)
-    return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value, at_rest)
+    return None
 
 
 def chance(now: Fitted, best: Tried, records: Records) -> float:
@@ -163,29 +173,39 @@ class _Removed:
 
 
 def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Removed]:
-    """Errors with and without an effect, for held-out and for fitted records."""
-    terms = records.terms(now, best.fitted)
-    return (
-        _Removed(_without_merit(terms, best, records.held), best.errors),
-        _Removed(_without_merit(terms, best, records.to_fit), best.fitted.errors(records.to_fit)),
-    )
+    """Errors with and without an effect, for held-out and for fitted records.
+
+    Equal terms are the free start states of the effect on both sides, or on neither side if the effect does as well
+    from rest. With a single hold per record, free start states follow any creep without it.
+    """
+    groups = records.held, records.to_fit
+    terms, free = records.terms(now, best.fitted), (best.errors, best.fitted.errors(records.to_fit))
+    if len(terms) > 1:
+        from_rest = [best.fitted.errors(items, now) for items in groups]
+        if all(no_worse(rms(a), rms(b), records.noise) for a, b in zip(from_rest, free, strict=True)):
+            held, to_fit = (_Removed(now.errors(items), e) for items, e in zip(groups, from_rest, strict=True))
+            return held, to_fit
+    held, to_fit = (_Removed(_without_merit(terms, best, items), e) for items, e in zip(groups, free, strict=True))
+    return held, to_fit
 
 
-def _explains_rest(removed: _Removed, group: int, records: Records) -> bool:
-    """Whether an effect leaves only noise, and removes more, of what moves while the drive stands still; `group`: 0 for
-    held-out records, 1 for fitted ones.
+def _explains_rest(held: _Removed, fitted: _Removed, records: Records) -> bool:
+    """Whether an effect explains most of what moves while the drive stands still, and not by chance.
 
     Rate-independent hysteresis of any kind keeps its output while the drive keeps its value, so that within a hold the
-    error of a model with the wrong hysteresis is constant.
+    error of a model with the wrong hysteresis is constant. That error still enters the effect: however right the
+    effect, a fraction of what moves remains, which may be far above the noise of a clean record.
     """
-    without, errors = (records.at_rest(each, group) for each in (removed.without, removed.errors))
-    if not errors:
-        return False
-    before, left, noise = rms(without), rms(errors), records.noise
-    if not (is_noise(left, noise) or (left <= acceptance.FAR_ABOVE_NOISE * noise and takes_most(left, before, noise))):
-        return False
-    enough = apart(before, left) >= acceptance.FIRST_REMOVES * noise
-    return enough and difference(without, errors) <= acceptance.P_SURE
+    moving = []
+    for group, removed in enumerate((held, fitted)):
+        without, errors = (records.at_rest(each, group) for each in (removed.without, removed.errors))
+        part, noise = _Removed(without, errors), records.noise
+        if not errors or part.removed < acceptance.FIRST_REMOVES * noise:
+            return False
+        if not (is_noise(part.left, noise) or takes_most(part.left, rms(without), noise)):
+            return False
+        moving.append(part)
+    return _by_chance(*moving) is None
 
 
 def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
