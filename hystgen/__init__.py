@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
     from hystgen.report.plan import plan as plan
+    from hystgen.report.tracking import track as track
     from hystgen.verification.run import verify as verify
 
 # The module of each public name, imported on first use because `hystgen emit` has to start fast. A test checks that it
@@ -68,6 +69,7 @@ _NAMES = {
     "report.diagnosis": ("diagnose",),
     "report.identification": ("identify", "report_fit"),
     "report.plan": ("plan",),
+    "report.tracking": ("track",),
     "verification.run": ("verify",),
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names}
