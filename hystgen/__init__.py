@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from hystgen.plays import operators as operators
     from hystgen.report.comparison import compare as compare
     from hystgen.report.diagnosis import diagnose as diagnose
+    from hystgen.report.fleet import report_fleet as report_fleet
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
     from hystgen.report.plan import plan as plan
@@ -67,6 +68,7 @@ _NAMES = {
     "parameters.schema": ("schema",),
     "report.comparison": ("compare",),
     "report.diagnosis": ("diagnose",),
+    "report.fleet": ("report_fleet",),
     "report.identification": ("identify", "report_fit"),
     "report.plan": ("plan",),
     "report.tracking": ("track",),

@@ -190,7 +190,7 @@ function start(root) {
     c.fillStyle = "#3d4650";
     c.lineWidth = 1;
     c.textAlign = "right";
-    for (const [at, text] of ticks(low, high, Math.max(2, (y1 - y0) / 40))) {
+    for (const [at, text] of ticks(low, high, Math.max(5, (y1 - y0) / 40))) {
       c.beginPath(); c.moveTo(x0, py(at)); c.lineTo(x1, py(at)); c.stroke();
       c.fillText(text, x0 - 5, py(at) + 4);
     }
