@@ -165,7 +165,7 @@ class Comparison(Presented):
         return tuple(each for each in self.models[1:] if self.tie(each))
 
     def sentence(self) -> str:
-        """Which model is closest, which cannot be told from it, and whether it is of any use."""
+        """Which model is closest, which others cannot be told from it, and whether it is of any use."""
         best, tied = self.models[0], self.tied
         noise = acceptance.is_noise(best.rms, self.noise)
         left = f"{best.rms:.4g}{self._u} rms, {percent(best.rms / self.output_range, of='the output range')}"

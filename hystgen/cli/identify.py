@@ -46,7 +46,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "--units", metavar="V,um", callback=_units,
     help="units of drive and output, to which records are converted; default: the records'",
 )
-@click.option("--strict", is_flag=True, help="exit with 1 where the figures say that the model is of no use")
+@click.option("--strict", is_flag=True, help="exit with 1 if the figures show that the model is of no use")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @common.record_options

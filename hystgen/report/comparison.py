@@ -114,9 +114,9 @@ def html(found: Comparison) -> str:
     names = ", ".join(record.name for record in found.records)
     picture = drawn(
         "deviations", partial(figure, found), (WIDE, NARROW),
-        f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and what cannot be told "
-        "from it. Below: measured minus model over time, on one scale for all models; dashed: the noise, 1 sd. Samples "
-        "that are not compared are left out.",
+        f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and any that cannot be "
+        "told from it. Below: measured minus model over time, on one scale for all models; dashed: the noise, 1 sd. "
+        "Samples that are not compared are left out.",
         "The rms deviation of each model beside the noise, and panels with each model's deviation over time.",
     )
     rows = found.rows()

@@ -83,8 +83,8 @@ def _mark(axes: Axes, ends: tuple[float, float], x: Array, what: str) -> None:
 
 
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
-    """Measured and predicted loop of one record, the same less the straight line by speed, residuals over time, and the
-    weights.
+    """Measured and predicted loop of one record, their deviation from the straight line by speed, residuals over time,
+    and the weights.
 
     `records`: the fitted records, then the held-out ones; the loop is from a held-out record if there is one.
     """
