@@ -121,7 +121,7 @@ def overlay(found: Diagnosis, width: float) -> Figure:
             top.plot(t, (each.y - each.before)[chosen], color=BEFORE, linewidth=0.9, label="refitted")
         top.plot(t, (each.y - each.after)[chosen], label=what, **drawing.LINES["model"])
         top.set(ylabel=label("displacement", unit))
-        top.set_title(each.name, pad=8 if width == WIDE else 22)
+        top.set_title(each.name, pad=8 if width == WIDE else 34)
         drawing.legend_above(top, 3 if width == WIDE else 2)
         if named:
             bottom.plot(t, each.before[chosen], color=BEFORE, linewidth=0.8, label="refitted")
@@ -435,7 +435,7 @@ def frequency(found: Diagnosis, width: float) -> Figure:
     if last is not None:
         panels.mark_mains(axes, *last, lines)
     axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
-    axes.set_title(each.name, pad=8 if width == WIDE else 22)
+    axes.set_title(each.name, pad=8 if width == WIDE else 34)
     drawing.legend_above(axes, 3 if width == WIDE else 2)
     return drawn
 
