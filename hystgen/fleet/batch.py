@@ -75,7 +75,7 @@ class Fleet:
     units: tuple[Unit, ...]
     judged: bool
     folder: Path = field(default=Path(), compare=False)
-    options: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    options: Mapping[str, object] = field(default_factory=dict, compare=False)
 
     def _repr_html_(self) -> str:
         head, *rows = csv.reader(io.StringIO(self.summary()))

@@ -6,7 +6,7 @@ import csv
 import io
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,10 +63,9 @@ def report_fleet(fleet: Fleet, folder: str | os.PathLike[str]) -> Path:
 
 def _lead(fleet: Fleet) -> list[Text]:
     done = len(fleet.units) - len(fleet.failed)
-    found = (
-        f"{counted(len(fleet.outliers), 'outlier')} among them" if fleet.judged
-        else f"outliers are judged only with {outliers.FEWEST} or more"
-    )  # fmt: skip
+    found = f"outliers are judged only with {outliers.FEWEST} or more"
+    if fleet.judged:
+        found = f"{counted(len(fleet.outliers), 'outlier')} among them"
     said = [Text(f"{counted(done, 'unit')} identified, {found}; {len(fleet.failed)} failed.")]
     for unit in [*fleet.failed, *fleet.outliers][:1]:
         why = "the failed unit" if unit in fleet.failed else "the outlier"
@@ -79,16 +78,14 @@ def _sections(fleet: Fleet, pictures: list[Picture]) -> list[Section]:
     head, *rows = csv.reader(io.StringIO(fleet.summary()))
     words = [k for k, name in enumerate(head) if name in ("unit", "file", "status", "message", "kind", "outlier_in")]
     table = HtmlTable([row[:-1] for row in (head, *rows)], words)
+    failed = [("unit", "reason"), *((unit.name, unit.message) for unit in fleet.failed)]
+    far = [("unit", "figures far from the median, with modified z-scores")]
+    far += [(unit.name, unit.outlier) for unit in fleet.outliers]
     marked = [
-        Section(title, [HtmlTable([("unit", what), *((unit.name, why) for unit, why in listed)], (0, 1))])
-        for title, what, listed in (
-            ("Failed", "reason", [(unit, unit.message) for unit in fleet.failed]),
-            ("Outliers", "figures far from the median, with modified z-scores", [
-                (unit, unit.outlier) for unit in fleet.outliers
-            ]),
-        )
-        if listed
-    ]  # fmt: skip
+        Section(title, [HtmlTable(listed, (0, 1))])
+        for title, listed in (("Failed", failed), ("Outliers", far))
+        if len(listed) > 1
+    ]
     zoom = _zoom(fleet)
     return [
         *marked,
@@ -150,8 +147,8 @@ def _units_figure(fleet: Fleet, listed: list[Judged], width: float) -> Figure:
                 fontsize=8, color=drawing.FAULT, ha="right" if right else "left", va="center",
             )
         _limits(axes, beside, judged, list(values.values()), fleet.judged)
-        beside.hist(list(points.values()), bins=_bins(list(values.values()), judged), orientation="horizontal",
-                    color=drawing.QUIET)  # fmt: skip
+        edges = _bins(list(values.values()), judged)
+        beside.hist(list(points.values()), bins=edges, orientation="horizontal", color=drawing.QUIET)
         beside.tick_params(labelbottom=False)
         beside.grid(visible=False)
         axes.set(ylabel=judged.words, xlim=(-0.7, len(order) - 0.3))
@@ -254,7 +251,8 @@ def _compared(fleet: Fleet, unit: Unit) -> comparison.Comparison | None:
     """A unit's model on its own record; None if the record cannot be read any more."""
     keys = ("history", "rest", "skip", "columns", "sample_time", "delimiter")
     options = {key: fleet.options[key] for key in keys if key in fleet.options}
+    compare: Callable[..., comparison.Comparison] = comparison.compare
     try:
-        return comparison.compare(fleet.folder / f"{unit.name}.yaml", unit.file, **options)
+        return compare(fleet.folder / f"{unit.name}.yaml", unit.file, **options)
     except (ValueError, OSError):
         return None
