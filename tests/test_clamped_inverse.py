@@ -191,7 +191,8 @@ def test_a_reference_out_of_range_is_limited_at_once_as_in_the_c(effect: str) ->
     assert counts["references limited"] == np.count_nonzero(status & slots.INPUT_CLAMPED)
     assert counts["references limited"] >= 7
     top = float(P @ (HIGH - R)) * (1.0 + SHARE * ("creep" in effect)) + OFFSET
-    assert v == pytest.approx(one.inverse().simulate(np.clip(u, OFFSET, top)), abs=1e-9 * HIGH)
+    by_hand, _ = told(lambda: one.inverse().simulate(np.clip(u, OFFSET, top)))
+    assert v == pytest.approx(by_hand, abs=1e-9 * HIGH)
     if "relaxation" not in effect:  # the C moves plays that relax in steps
         assert np.max(np.abs(v - bits)) < 1e-9 * HIGH
     record = Record("u.csv", one.run(u).t, u, extra={"u": u})

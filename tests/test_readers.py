@@ -158,7 +158,7 @@ def test_one_of_several_parts_is_named_behind_the_file(tmp_path: Path) -> None:
     (tmp_path / "books.zip").write_bytes(made.zipped({"book.xlsx": book.read_bytes(), "a.csv": runs["a.csv"]}))
     check(read_record(tmp_path / "books.zip" / "book.xlsx" / "Run 1"))
     (tmp_path / "a.csv").write_bytes(runs["a.csv"])
-    assert "has no parts, of which Run 1 could be one" in refused(tmp_path / "a.csv" / "Run 1")
+    assert "has no parts, so it cannot contain Run 1" in refused(tmp_path / "a.csv" / "Run 1")
 
 
 @pytest.mark.parametrize("write", [made.mat_with, made.mat_73_with])
