@@ -45,9 +45,11 @@ if TYPE_CHECKING:
     from hystgen.plays import operators as operators
     from hystgen.report.comparison import compare as compare
     from hystgen.report.diagnosis import diagnose as diagnose
+    from hystgen.report.fleet import report_fleet as report_fleet
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
     from hystgen.report.plan import plan as plan
+    from hystgen.report.tracking import track as track
     from hystgen.verification.run import verify as verify
 
 # The module of each public name, imported on first use because `hystgen emit` has to start fast. A test checks that it
@@ -66,8 +68,10 @@ _NAMES = {
     "parameters.schema": ("schema",),
     "report.comparison": ("compare",),
     "report.diagnosis": ("diagnose",),
+    "report.fleet": ("report_fleet",),
     "report.identification": ("identify", "report_fit"),
     "report.plan": ("plan",),
+    "report.tracking": ("track",),
     "verification.run": ("verify",),
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names}

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, display, drawing
+from hystgen.basics import arguments, display
+from hystgen.basics.presented import Presented
 from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, RecordError, counted, percent
 from hystgen.diagnosis.data import preparing
 from hystgen.diagnosis.data.items import Item, rms
@@ -28,8 +27,6 @@ from hystgen.records import Source, in_units, read_records, several
 from hystgen.records.units import conversion
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from hystgen.parameters.schema import Units
 
 Array = NDArray[np.float64]
@@ -88,11 +85,11 @@ class Compared:
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison:
+class Comparison(Presented):
     """Models side by side: `line`, the baseline, and `models`, the closest to the records first.
 
     `noise`: rms of the records' noise; `output_range`: the 100 % of the percentages; both in output units. `notes`:
-    what was done to the records; `page`: makes `report.html`; `draw`: draws the deviations on one scale.
+    what was done to the records. The picture shows the deviations over time, on one scale.
     """
 
     unit: str
@@ -102,8 +99,7 @@ class Comparison:
     noise: float
     output_range: float
     notes: tuple[str, ...] = ()
-    page: Callable[[Comparison], str] | None = field(default=None, compare=False)
-    draw: Callable[[Comparison], Figure] | None = field(default=None, compare=False)
+    drive_unit: str = ""
 
     FILES = ("comparison.json", "report.html", "deviations.svg")
 
@@ -111,8 +107,7 @@ class Comparison:
         return f"<Comparison of {counted(len(self.models), 'model')} on {counted(len(self.records), 'record')}>"
 
     def _repr_html_(self) -> str:
-        draw = None if self.draw is None else partial(self.draw, self)
-        return display.block(repr(self), self.sentence(), draw, self.rows())
+        return display.block(repr(self), self.sentence(), self.draw, self.rows())
 
     def rows(self) -> list[tuple[str, ...]]:
         """The table: a header, the straight line, and the models; columns without any figure are left out."""
@@ -144,7 +139,8 @@ class Comparison:
             f"100 % are {self.output_range:.4g}{self._u}."
         ]
         if len(rows[0]) > PLAIN:
-            below.append(f"C, estimated for a {CORE}: instructions of the dearest sample; bytes of flash and of RAM.")
+            cost = "instructions of the most expensive sample; bytes of flash and of RAM"
+            below.append(f"C, estimated for a {CORE}: {cost}.")
         return "\n".join([*lines, *below, self.sentence()])
 
     @property
@@ -169,7 +165,7 @@ class Comparison:
         return tuple(each for each in self.models[1:] if self.tie(each))
 
     def sentence(self) -> str:
-        """Which model is closest, which cannot be told from it, and whether it is of any use."""
+        """Which model is closest, which others cannot be told from it, and whether it is of any use."""
         best, tied = self.models[0], self.tied
         noise = acceptance.is_noise(best.rms, self.noise)
         left = f"{best.rms:.4g}{self._u} rms, {percent(best.rms / self.output_range, of='the output range')}"
@@ -217,26 +213,6 @@ class Comparison:
     def to_json(self) -> str:
         """The comparison for programs."""
         return json.dumps(_in_digits(self.content()), indent=2, allow_nan=False) + "\n"
-
-    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """The deviations of all models over time, on one scale; also saved to `path`, a .png or .svg file, if given.
-
-        Returns a matplotlib Figure, which a notebook displays. Raises PlotError, OSError.
-        """
-        assert self.draw is not None, "hystgen.compare sets it"
-        return drawing.picture(partial(self.draw, self), path)
-
-    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write `comparison.json`, `report.html` and `deviations.svg` into a folder, either all files or none; returns
-        the paths. Raises PlotError without matplotlib."""
-        from hystgen.basics import writing
-
-        assert self.page is not None, "hystgen.compare sets it"
-        assert self.draw is not None
-        with drawing.styled():
-            picture = drawing.content(self.draw(self), "svg")
-        made = (self.to_json().encode("utf-8"), self.page(self).encode("utf-8"), picture)
-        return writing.write_files(Path(folder), dict(zip(self.FILES, made, strict=True)))
 
 
 def _listed(models: Sequence[Deviation]) -> str:
@@ -312,6 +288,7 @@ def compare(
         units.output, tuple(Compared(item.name, item.run.t, item.run.v, item.y) for item in compared), line,
         tuple(sorted(rows, key=lambda each: each.rms)), noise_floor(compared).rms,
         max(float(np.ptp(item.y[item.known])) for item in compared), tuple(dict.fromkeys(notes)),
+        units.input,
     )
 
 

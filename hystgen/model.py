@@ -491,15 +491,18 @@ class Model:
             self.cascade.inverse()
         return InverseModel(self)
 
-    def outside(self, reference: Run) -> NDArray[np.bool_]:
-        """Which references (N,) lie outside the output range, all effects at rest, to which the C limits them."""
+    def limited(self, reference: Run, asked: NDArray[np.bool_] | None = None) -> tuple[Run, NDArray[np.bool_]]:
+        """The references limited to the output range with all effects at rest, as in the C, and a mask (N,) of those
+        that lay outside; `asked` (N,): which samples are references."""
         from hystgen.compensator.chain import layout
 
         record = float(np.median(reference.steps)) if len(reference.steps) else 1.0
         seconds = self.parameters.sample_time or record
         low, high = layout.output_range(self.cascade, self.compensator.parts, seconds)
+        asked = np.ones(len(reference.v), dtype=bool) if asked is None else asked
         rounded = remarks.ROUNDED * (high - low)
-        return (reference.v < low - rounded) | (reference.v > high + rounded)
+        outside = asked & ((reference.v < low - rounded) | (reference.v > high + rounded))
+        return replace(reference, v=np.where(asked, np.clip(reference.v, low, high), reference.v)), outside
 
     @cached_property
     def compensator(self) -> Compensator:
@@ -524,10 +527,10 @@ class InverseModel:
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments, and series and frames, as for `Model.simulate`.
 
-        As in the C, the drive stays in `input_range` and the memory follows the limited drive, so the inverse is exact
-        again at the next reachable reference; `clamp=False` gives the unlimited inverse, in double precision. A
-        non-finite sample holds the drive. Warns (`SampleWarning`) with the numbers of limited and of held samples, and
-        of references outside the output range, which the C limits even while the drive is far from its end.
+        As in the C, references are limited to the output range and drives to `input_range`, and the memory follows the
+        limited drive, so the inverse is exact again at the next reachable reference; `clamp=False` gives the unlimited
+        inverse, in double precision. A non-finite sample holds the drive. Warns (`SampleWarning`) with the numbers of
+        limited and of held samples.
 
         With effects the whole reference is known in advance: delays and modes look ahead in it, and the model is at
         rest at the first sample. The settings of `emit.compensation` in the parameter file apply, counted in samples of
@@ -555,11 +558,12 @@ class InverseModel:
         low, high = model.cascade.input_range
         references, held = _held("u", u, None)
         ends = (low, high) if clamp else (-math.inf, math.inf)
-        run = model.run(references, t, extra)
+        run, outside = model.run(references, t, extra), np.zeros(len(references), dtype=bool)
+        if clamp:
+            run, outside = model.limited(run)
         v, beyond = model.compensator.answers(run, ends, held=held)
-        outside = model.outside(run) & ~held & clamp
         limited = beyond > remarks.ROUNDED * (high - low)
-        return v, remarks.compensated(outside, limited, int(np.count_nonzero(held)))
+        return v, remarks.compensated(outside & ~held, limited, int(np.count_nonzero(held)))
 
     def inverse(self) -> Model:
         """The model that this inverse compensates."""

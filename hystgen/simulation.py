@@ -184,8 +184,8 @@ def _compensated(
     asked = np.zeros(len(session.run.t), dtype=bool)
     for part in session.parts:
         asked[part] = True
-    drives, beyond = model.compensator.answers(session.run, ends, asked)
-    outside = model.outside(session.run) & asked
+    limited_run, outside = model.limited(session.run, asked)
+    drives, beyond = model.compensator.answers(limited_run, ends, asked)
     limited = beyond > remarks.ROUNDED * (high - low)
     return [
         (drives[part], _of(record.name, remarks.compensated(outside[part], limited[part])))

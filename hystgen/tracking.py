@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display
+from hystgen.basics.presented import Presented
 from hystgen.basics.problems import counted
 from hystgen.compensator.chain.layout import LEAST_LATE
 from hystgen.identification import instruments
@@ -35,7 +36,8 @@ LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
 
 @dataclass(frozen=True)
 class Tracked:
-    """Tracking of one record's motion: error (N,) of each compensator and `span` of the motion, in output units.
+    """Tracking of one record's motion, in output units: error (N,) of each compensator, reference minus motion, and
+    `span` of the motion; `drive` (N,): that of the whole model, in input units.
 
     `known`: the sample by which the drive has visited both its extremes, so that the motion before the record no longer
     matters. Errors have their mean from `known` on removed, because the zero of a displacement is arbitrary. `limited`:
@@ -44,6 +46,7 @@ class Tracked:
 
     name: str
     t: Array
+    drive: Array
     reference: Array
     errors: dict[str, Array]
     span: float
@@ -60,16 +63,20 @@ class Tracked:
 
 
 @dataclass(frozen=True, repr=False)
-class Tracking:
+class Tracking(Presented):
     """Tracking errors of the recorded actuator with each compensator, record by record.
 
     `left_out`: names of the model's effects, which "plays alone" lacks; `notes`: unit conversions, one sentence each.
+    The picture shows the errors over time.
     """
 
     unit: str
     records: tuple[Tracked, ...]
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    drive_unit: str = ""
+
+    FILES = ("tracking.json", "report.html", "tracking.svg")
 
     @property
     def compensators(self) -> dict[str, str]:
@@ -86,13 +93,26 @@ class Tracking:
         return f"<Tracking of {counted(len(self.records), 'record')}>"
 
     def _repr_html_(self) -> str:
-        head = ("record", "compensator", "rms %", "max %")
-        rows = [
+        said = "\n".join(f"{which}: {what}." for which, what in self.compensators.items())
+        return display.block(f"{self!r}: % of the motion's span, about the mean", said, self.draw, self.rows())
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """The table: a header, and a row per record and compensator."""
+        found = [
             (each.name, which, f"{each.rms(which):.3f}", f"{each.most(which):.3f}")
             for each in self.records for which in each.errors
         ]
-        said = "\n".join(f"{which}: {what}." for which, what in self.compensators.items())
-        return display.block(f"{self!r}: % of the motion's span, about the mean", said, rows=[head, *rows])
+        return [("record", "compensator", "rms %", "max %"), *found]
+
+    def sentence(self) -> str:
+        """The rms error with each compensator; on several records, the largest."""
+        most = {which: max(each.rms(which) for each in self.records) for which in self.compensators}
+        where = " at most" if len(self.records) > 1 else ""
+        plays = f", with plays alone {most[PLAYS]:.3g} %" if self.left_out else ""
+        return (
+            f"The rms tracking error with the whole model is{where} {most[WHOLE]:.3g} % of the motion's span{plays}, "
+            f"and with a straight line {most[LINE]:.3g} %."
+        )
 
     def table(self) -> str:
         """The table that the command prints."""
@@ -187,8 +207,13 @@ def track(
         known = max(known if known < MOST_UNKNOWN * len(record.v) else 0, samples_in(record, skip))
         errors = {}
         for which, y in moves.items():
-            error = y - reference + beside
+            error = reference - y - beside
             errors[which] = error - np.mean(error[known:])
-        found.append(Tracked(record.name, run.t, reference, errors, float(np.ptp(reference)), known, tuple(limited)))
+        found.append(
+            Tracked(
+                record.name, run.t, drives[WHOLE], reference, errors, float(np.ptp(reference)), known, tuple(limited)
+            )
+        )
     names = dict.fromkeys(effect.name for effect in model.effects)
-    return Tracking(model.parameters.units.output, tuple(found), tuple(names), tuple(notes))
+    units = model.parameters.units
+    return Tracking(units.output, tuple(found), tuple(names), tuple(notes), units.input)

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from scipy import signal
 
 import hystgen
+from hystgen import simulation
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.chain.run import with_status
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
+from hystgen.records import Record
 
 Array = NDArray[np.float64]
 R, P = np.array([0.0, 5.0, 20.0]), np.array([120.0, 20.0, 30.0])
@@ -91,7 +93,9 @@ def test_the_drive_stays_in_range_and_is_exact_wherever_it_is_not_limited(name: 
     assert 20 < np.count_nonzero(off) < 250
     assert set(counts) <= {"references limited", "drives limited"}
     assert sum(counts.values()) == np.count_nonzero(off)
-    assert np.all((v[off] == 0.0) | (v[off] == HIGH)), "where it misses, it is at an end"
+    top = float(P @ (HIGH - R)) * (1.0 + SHARE * (name == "creep")) + OFFSET  # settled at the largest drive
+    ends = (v == 0.0) | (v == HIGH) | (u > top) | (u < OFFSET)
+    assert np.all(ends[off]), "where it misses, it is at an end, or the reference is beyond one"
     assert off[:-1][~off[1:]].any(), "the sample behind a limited one is exact again"
 
 
@@ -176,14 +180,28 @@ def test_a_pure_cascade_keeps_its_range_and_a_play_sum_has_none() -> None:
     ["name: slew_limit, rate: 5000", f"name: creep, time_constants: [{TAU}], weights: [{SHARE}]",
      "name: rate_dependence, shape: relaxation, time_constant: 0.005"],
 )  # fmt: skip
-def test_a_reference_out_of_range_is_told_of_at_once_as_in_the_c(effect: str) -> None:
-    """Even while a slew limit keeps the drive far from its end; those told of are those that the C marks."""
+def test_a_reference_out_of_range_is_limited_at_once_as_in_the_c(effect: str) -> None:
+    """Even while a slew limit keeps the drive far from its end; those told of are those that the C marks, and the
+    drives are those of the C."""
     one = model(f"{PLAIN}  effects: [{{{effect}}}]\n")
     u = np.concatenate([np.zeros(3), np.full(4, 1e5), np.full(200, OFFSET + 2000.0), np.full(3, -1e5)])
     v, counts = told(lambda: one.inverse().simulate(u))
     compiled = one.compiled("float64", one.engine(arithmetic="float64"))
-    _, status = with_status(compiled, one.run(u), True)
+    bits, status = with_status(compiled, one.run(u), True)
     assert counts["references limited"] == np.count_nonzero(status & slots.INPUT_CLAMPED)
     assert counts["references limited"] >= 7
+    top = float(P @ (HIGH - R)) * (1.0 + SHARE * ("creep" in effect)) + OFFSET
+    by_hand, _ = told(lambda: one.inverse().simulate(np.clip(u, OFFSET, top)))
+    assert v == pytest.approx(by_hand, abs=1e-9 * HIGH)
+    if "relaxation" not in effect:  # the C moves plays that relax in steps
+        assert np.max(np.abs(v - bits)) < 1e-9 * HIGH
+    record = Record("u.csv", one.run(u).t, u, extra={"u": u})
+    ((recorded, said),) = simulation.simulate_records(one, [record], "inverse")
+    assert np.array_equal(recorded, v)
+    assert said[0].startswith(f"u.csv: {counts['references limited']} of {len(u)} references lie outside")
+    free, counts = told(lambda: one.inverse().simulate(u, clamp=False))
+    assert counts == {}
     if "slew" in effect:
         assert np.max(v[:7]) < 0.5 * HIGH, "none of these drives is at its end"
+    else:
+        assert np.max(free) > 5.0 * HIGH

@@ -79,6 +79,7 @@ def test_the_table_of_a_stage_that_creeps(folder: Path, run: Call) -> None:
     page = html.unescape(files[1].read_text())
     assert page.count("<svg") + page.count("image/svg+xml") >= 2
     assert found["sentence"] in page
+    assert page.partition('<tr class="marked">')[2].split("</td>")[0].endswith(str(models[1])), "the closest is marked"
     assert creep["cost"]["flash"] > plain["cost"]["flash"] > 0
 
 

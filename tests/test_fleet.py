@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import functools
+import html
 import json
 import os
+import re
 import shutil
 import signal
 import statistics
@@ -103,9 +105,17 @@ def few(tmp_path: Path) -> Path:
 
 def test_the_command(units: Path, fleet: Path, tmp_path: Path, run: Run) -> None:
     """Two processes write the same bytes as one, and the command the same as the Python call."""
-    output = tmp_path / "new" / "params"
-    code, out, err = run("identify", "--batch", units / "*.csv", "-o", output, "--jobs", 2)
-    assert (code, out.split()) == (1, [str(output / "summary.csv")])
+    output, report = tmp_path / "new" / "params", tmp_path / "report"
+    code, out, err = run("identify", "--batch", units / "*.csv", "-o", output, "--jobs", 2, "--report", report)
+    assert (code, out.split()) == (1, [str(output / "summary.csv"), str(report / "report.html")])
+    page = (report / "report.html").read_text()
+    assert page.count("data:image/svg+xml") == 4
+    shown = json.loads(html.unescape(re.findall(r'data-viewer="([^"]*)"', page)[0]))["records"]
+    assert [(each["name"], each["role"]) for each in shown[:2]] == [("SN_103", "outlier"), ("SN_109", "outlier")]
+    assert [each["role"] for each in shown[2:]] == ["typical unit"]
+    assert f"hystgen identify {units / 'garbage.csv'} -o garbage.yaml" in page
+    for name in ("units", "loops"):
+        assert (report / f"{name}.svg").read_text().count("<path") > SOUND
     assert tree(output) == tree(fleet)
     printed = err.splitlines()
     table = rows(output)
@@ -181,6 +191,18 @@ def test_outliers_by_hand_with_the_planted_ones_among_them(fleet: Path) -> None:
         assert row["outlier"] == ("yes" if name in expected else "no")
         printed = {part.rsplit(" (z ", 1)[0] for part in row["outlier_in"].split("; ")} - {""}
         assert printed == {part.rsplit(" (z ", 1)[0] for part in expected.get(name, ())}
+
+
+def test_the_page_of_units_that_are_not_judged_or_all_failed(few: Path, tmp_path: Path) -> None:
+    found = hystgen.identify_batch(few, tmp_path / "params", emit=False, jobs=1)
+    page = hystgen.report_fleet(found, tmp_path / "report")
+    assert "outliers are judged only with 8 or more" in page.read_text()
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "a.csv").write_text("")
+    failed = hystgen.identify_batch(tmp_path / "bad", tmp_path / "none", emit=False, jobs=1)
+    page = hystgen.report_fleet(failed, tmp_path / "second")
+    assert "0 units identified" in page.read_text()
+    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
 
 
 def test_few_units_are_not_judged(few: Path, tmp_path: Path, run: Run) -> None:

@@ -61,7 +61,7 @@ def test_a_manifest_says_what_files_and_headers_say(name: str, arithmetic: str, 
         assert f"{operator} instance {figures['ram', operator, '']} bytes of RAM" in banner
         small, stack = (figures[what, operator, "cortex-m0plus"] for what in ("instructions", "stack"))
         dearest = f"about {small} instructions and {stack} bytes of stack on a Cortex-M0+"
-        assert f"{operator} step, dearest: {dearest}" in banner
+        assert f"{operator} step, costliest: {dearest}" in banner
     assert f"constant tables {figures['tables', '', '']} bytes" in banner
     assert found["licence"] == "0BSD"
     assert len(found["misra"]) > 10

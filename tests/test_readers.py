@@ -158,7 +158,7 @@ def test_one_of_several_parts_is_named_behind_the_file(tmp_path: Path) -> None:
     (tmp_path / "books.zip").write_bytes(made.zipped({"book.xlsx": book.read_bytes(), "a.csv": runs["a.csv"]}))
     check(read_record(tmp_path / "books.zip" / "book.xlsx" / "Run 1"))
     (tmp_path / "a.csv").write_bytes(runs["a.csv"])
-    assert "has no parts, of which Run 1 could be one" in refused(tmp_path / "a.csv" / "Run 1")
+    assert "has no parts, so it cannot contain Run 1" in refused(tmp_path / "a.csv" / "Run 1")
 
 
 @pytest.mark.parametrize("write", [made.mat_with, made.mat_73_with])
@@ -175,7 +175,7 @@ def test_objects_of_matlab(tmp_path: Path, write: Callable[..., Any], kind: str,
     path = tmp_path / "a.mat"
     write({"T": kind})(path)
     said = refused(path)
-    assert f"in MATLAB objects, which only MATLAB can read: T ({kind}); type there: " in said
+    assert f"in MATLAB objects, which only MATLAB can read: T ({kind}); in MATLAB, type: " in said
     assert typed in said
 
 
@@ -228,7 +228,7 @@ def test_times_of_another_channel(tmp_path: Path) -> None:
         ("a.wfm", b"\x0f\x0f:WFM#003" + bytes(99), "save the waveforms as CSV"),
         ("a.trc", b"#9000100359WAVEDESC" + bytes(99), "save the waveforms as CSV"),
         ("a.csv.zst", b"\x28\xb5\x2f\xfd" + bytes(99), "unpack it with zstd -d"),
-        ("a.tdms_index", b"TDSh" + bytes(99), "give the file without _index beside it"),
+        ("a.tdms_index", b"TDSh" + bytes(99), "give the .tdms file beside it"),
         ("a.npy", made.pickled(), "holds Python objects; save arrays of numbers"),
         ("a.json", b'{"t": [1, 2,\n  3}', ":2:4: error: is not JSON"),
         ("a.jsonl", b'{"t": 1, "v": 2}\n{"t": 2, "v"}\n', ":2:13: error: is not JSON"),
@@ -360,7 +360,7 @@ def test_changes_of_the_clock_are_told(tmp_path: Path) -> None:
     for season, said in (("autumn", "back"), ("spring", "forward")):
         made.stamps(season)(tmp_path / "a.csv")
         notes = read_record(tmp_path / "a.csv").notes
-        assert notes == (f"the clock was put {said} by an hour; it was taken as running on",)
+        assert notes == (f"the clock was set {said} by an hour; the times were read as if it had not been",)
 
 
 # In memory ------------------------------------------------------------------------------------------------------------

@@ -716,7 +716,7 @@ def test_the_dearest_sample_in_the_header_is_about_what_a_core_takes(name: str, 
     assert report.ok, report.table()
     for operator in ("forward", "inverse"):
         found = re.search(
-            rf"{operator} step, dearest: about (\d+) instructions and (\d+) bytes of stack on a Cortex-M0\+, "
+            rf"{operator} step, costliest: about (\d+) instructions and (\d+) bytes of stack on a Cortex-M0\+, "
             r"(\d+) and (\d+) on a Cortex-M4F",
             header,
         )

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import hystgen
 from hystgen import simulation, tracking
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -83,7 +86,7 @@ def test_plays_alone_are_the_plays_of_the_model() -> None:
     (one,) = tracking.track(model, [other]).records
     states = [0.0] * 5
     v = [solved(float(y), states) for y in one.reference]
-    error = model.simulate(v, t=record.t) - one.reference + other.y - one.reference
+    error = one.reference - model.simulate(v, t=record.t) - (other.y - one.reference)
     error -= np.mean(error[one.known :])
     assert one.errors[tracking.PLAYS] == pytest.approx(error, abs=1e-9)
     (said,) = one.limited
@@ -151,17 +154,24 @@ def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple
     rows = np.column_stack([record.t, record.v, record.y])
     np.savetxt(tmp_path / "crept.csv", rows, delimiter=",", header="t,v,y", comments="")
     (tmp_path / "crept.yaml").write_text(TEXT)
-    written_to = ["--plot", tmp_path / "t.svg", "--json", tmp_path / "t.json"]
+    written_to = ["--plot", tmp_path / "t.svg", "--json", tmp_path / "t.json", "-o", tmp_path / "tracking"]
     code, out, err = run("track", tmp_path / "crept.yaml", tmp_path / "crept.csv", *written_to)
     assert code == 0, err
-    assert out.splitlines()[-2:] == [str(tmp_path / "t.json"), str(tmp_path / "t.svg")]
+    made = [tmp_path / "tracking" / name for name in ("tracking.json", "report.html", "tracking.svg")]
+    assert out.splitlines()[-5:] == [str(tmp_path / "t.json"), str(tmp_path / "t.svg"), *map(str, made)]
+    assert made[0].read_text() == (tmp_path / "t.json").read_text()
+    assert made[2].read_bytes() == (tmp_path / "t.svg").read_bytes()
     written = json.loads((tmp_path / "t.json").read_text())
     assert written["left_out"] == ["creep"]
     assert "without its effects (creep)" in written["compensators"]["plays alone"]
     (one,) = written["records"]
     assert f"{one['errors']['whole model']['rms']:6.3f}" in out
     assert "straight line" in out
-    assert (tmp_path / "t.svg").stat().st_size > 1000
+    (viewer,) = re.findall(r'data-viewer="([^"]*)"', made[1].read_text())
+    shown = json.loads(html.unescape(viewer))
+    assert shown["models"] == [tracking.LINE, tracking.PLAYS, tracking.WHOLE]
+    assert shown["words"] == ["reference", "reference \N{MINUS SIGN} motion"]
+    assert shown["records"][0]["count"] == len(record)
     assert "late" not in err
     (tmp_path / "late.yaml").write_text(TEXT + "emit: {compensation: {corner: 21, preview: 10}}\n")
     code, _, err = run("track", tmp_path / "late.yaml", tmp_path / "crept.csv")
@@ -183,9 +193,19 @@ def test_what_rounds_corners_or_makes_late_counts_as_error() -> None:
         averaged = np.convolve(np.pad(averaged, 20, mode="edge"), mean)[20:-40]
     motion = np.append(averaged[10:], np.full(10, averaged[-1]))
     assert record.y is not None
-    reached = motion - one.reference + record.y - one.reference
+    reached = one.reference - motion - (record.y - one.reference)
     reached -= np.mean(reached[one.known :])
     assert float(np.max(np.abs(one.errors[tracking.WHOLE] - reached)[one.known : -60])) < 1e-3 * float(np.ptp(reached))
+
+
+def test_the_page_of_a_model_without_effects_shows_it_once() -> None:
+    found = hystgen.track(Model(parse_parameters(TEXT.partition("  effects")[0])), [recorded()])
+    assert found.page is not None
+    page = found.page()
+    assert "plays alone" not in json.loads(html.unescape(re.findall(r'data-viewer="([^"]*)"', page)[0]))["models"]
+    labels = [line.get_label() for axes in found.plot().axes for line in axes.get_lines()]
+    assert [text for text in labels if text.startswith("plays alone")] == []
+    assert sum(text.startswith("whole model") for text in labels) == 1
 
 
 def test_tracking_needs_the_motion() -> None:

@@ -94,7 +94,7 @@ def main() -> None:
         motion.set(title="Motion wanted", ylabel="displacement (um)")
         colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
         for (name, step), colour in zip(runs.items(), colours, strict=True):
-            left = tracked(step, wanted) - wanted
+            left = wanted - tracked(step, wanted)
             left -= np.mean(left[inside])  # the zero of a displacement is arbitrary
             rms = 100.0 * float(np.std(left[inside])) / (high - low)
             print(f"{name:24} {rms:6.3f} % of the motion, rms")

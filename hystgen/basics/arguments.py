@@ -250,5 +250,5 @@ def outside(name: str, drives: Sequence[float], allowed: tuple[float, float], wh
         return []
     return [
         f"{name} goes to {max(far, key=lambda drive: abs(drive - (low + high) / 2.0)):.6g}, outside {whose}, {low:.6g} "
-        f"to {high:.6g}: what the plays do there is not known; is it in the drive's unit?"
+        f"to {high:.6g}: the model is not known that far out; is it in the drive's unit?"
     ]

@@ -162,7 +162,8 @@ def _skew(_context: click.Context, _option: click.Parameter, value: str | None) 
 
 skew_option = click.option(
     "--clock-skew", metavar="PPM|auto", callback=_skew,
-    help="take out a delay of y after v that grows by this many us per s, as clocks of their own cause; auto: as found",
+    help="remove a delay of y after v that grows by this many us per s, as when drive and sensor run on separate "
+    "clocks; auto: as estimated",
 )
 
 
@@ -229,7 +230,7 @@ class Judging(click.Command):
 
 
 def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[..., object]]:
-    """The records given to a command, with those joined from two files each behind the others."""
+    """The records given to a command, with those joined from two files each after the others."""
 
     def with_joined(command: Callable[..., object]) -> Callable[..., object]:
         @functools.wraps(command)

@@ -66,7 +66,7 @@ def _names(_context: click.Context, _option: click.Parameter, value: str | None)
 )
 @click.option(
     "--with", "known", metavar="creep,lag", callback=_names,
-    help="effects known to be there: fitted and written in any case, and judged all the same",
+    help="effects known to be present: always fitted and written, and judged like any other",
 )
 @common.effects_option
 @common.record_options

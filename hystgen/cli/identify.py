@@ -46,7 +46,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "--units", metavar="V,um", callback=_units,
     help="units of drive and output, to which records are converted; default: the records'",
 )
-@click.option("--strict", is_flag=True, help="exit with 1 where the figures say that the model is of no use")
+@click.option("--strict", is_flag=True, help="exit with 1 if the figures show that the model is of no use")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @common.record_options
@@ -61,7 +61,7 @@ def identify(
 
     Example: hystgen identify sweep.csv --holdout other.csv -o stage_x.yaml --units V,um
 
-    Example: hystgen identify --batch 'units/*.csv' -o params/
+    Example: hystgen identify --batch 'units/*.csv' -o params/ --report report/
     """
     from hystgen import identification
     from hystgen.basics import extras, writing
@@ -81,12 +81,12 @@ def identify(
     }
     only_batch: dict[str, object] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
     if batch:
-        for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
+        for option, value in (("--name", name), ("--plot", plot)):
             if value is not None:
                 raise click.UsageError(f"{option} is for one model; leave it out with --batch")
         # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
-            (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
+            (*batch, *data), output, report, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
             strict=strict, **options, **how,
         )
         return
@@ -148,10 +148,16 @@ def identify(
     common.guarded(data[0], run)
 
 
-def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> None:
+def _identify_batch(sources: tuple[str, ...], output: str, report: str | None, **options: Any) -> None:
     """Print the result of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
+    from hystgen.basics import writing
     from hystgen.fleet import batch as fleet
+    from hystgen.report import fleet as pages
+    from hystgen.report.identification import check_folder
 
+    if report:
+        common.guarded(report, partial(check_folder, report))
+        common.guarded(report, partial(writing.check_files, Path(report), pages.FILES))
     try:
         done = common.guarded(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
@@ -159,5 +165,7 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
         raise common.Failed(said, 130) from None
     console.note(done.table().rstrip("\n"))
     console.say(str(Path(output) / "summary.csv"))
+    if report:
+        console.say(str(common.guarded(report, lambda: pages.report_fleet(done, report))))
     if done.failed:
         raise common.Failed(f"error: {len(done.failed)} of {counted(len(done.units), 'unit')} failed", 1)

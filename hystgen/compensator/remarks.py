@@ -41,18 +41,11 @@ def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[s
 
 
 def compensated(references: NDArray[np.bool_], drives: NDArray[np.bool_], held: int = 0) -> list[str]:
-    """Remarks on the inverse in double precision of a model with effects. Unlike the C it does not limit a reference
-    whose drive is in range, as behind a slew limit or while plays that relax are moving.
+    """Remarks on the inverse in double precision of a model with effects.
 
     `references` (N,): those outside the output range; `drives` (N,): limited ones.
     """
-    limited, others, free = (
-        int(np.count_nonzero(each)) for each in (references & drives, drives & ~references, references & ~drives)
-    )
-    samples, lie, they = len(drives), "lies" if free == 1 else "lie", "it is" if free == 1 else "they are"
-    where = f"{lie} outside the output range, with drives in range"
-    inside = f"{free} of {samples} references {where}; in the C {they} limited"
-    return [*([inside] if free else []), *inverse(samples, limited, others, held)]
+    return inverse(len(drives), int(np.count_nonzero(references)), int(np.count_nonzero(drives & ~references)), held)
 
 
 def _held(number: int, samples: int) -> list[str]:

@@ -262,7 +262,7 @@ class Effect(BaseModel):
     rank: ClassVar[float] = math.inf
     """order of effects that explain records equally well: a lag or delay, as in every drive, before plays that lag"""
     creeps: ClassVar[bool] = False
-    """whether it is the motion that goes on long after the drive has stopped, drawn over the logarithm of time"""
+    """whether it is the motion that goes on long after the drive has stopped, drawn on a logarithmic time axis"""
     from_start: ClassVar[bool] = False
     """whether it depends on the time since the first sample"""
     block: ClassVar[OwnBlock | None] = None

@@ -194,7 +194,7 @@ def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
-        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for similar models{uncounted}"
+        *(f"    {op} step, costliest: about {estimate.dearest_words(op)}, as measured for similar models{uncounted}"
           for op in options.operators),
         *avr,
         "",

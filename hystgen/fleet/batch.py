@@ -69,10 +69,13 @@ class Unit:
 
 @dataclass(frozen=True)
 class Fleet:
-    """All units of a call, sorted by name; `judged` is False if there are too few to mark outliers."""
+    """All units of a call, sorted by name; `judged` is False if there are too few to mark outliers. `folder`: of their
+    parameter files; `options`: of `identify`."""
 
     units: tuple[Unit, ...]
     judged: bool
+    folder: Path = field(default=Path(), compare=False)
+    options: Mapping[str, object] = field(default_factory=dict, compare=False)
 
     def _repr_html_(self) -> str:
         head, *rows = csv.reader(io.StringIO(self.summary()))
@@ -198,7 +201,7 @@ def identify_batch(
                 for result in results:
                     rows[result.unit] = _keep(folder, todo[result.unit], result)
                     bar.tick(1)
-    fleet = _judged([rows[job.unit] for job in found])
+    fleet = replace(_judged([rows[job.unit] for job in found]), folder=folder, options=options)
     write_atomically(folder / "summary.csv", fleet.summary())
     return fleet
 

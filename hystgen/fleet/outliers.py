@@ -55,20 +55,32 @@ JUDGED = (
 )
 
 
-def modified_scores(values: Sequence[float]) -> list[float]:
-    """Modified z-score of every value, in the order given.
+def spread(values: Sequence[float]) -> tuple[float, float]:
+    """Median, and the difference from it that scores 1; the latter is 0 if all values are equal.
 
     If more than half of the values are equal, MAD is 0 and the mean absolute deviation takes its place with its own
-    factor sqrt(2/pi); if all are equal, all scores are 0.
+    factor sqrt(2/pi).
     """
     x = np.asarray(values, dtype=np.float64)
     middle = float(np.median(x))
     away = np.abs(x - middle)
     alike = SAME * max(abs(middle), float(np.finfo(np.float64).tiny))
-    for spread, factor in ((float(np.median(away)), 0.6745), (float(np.mean(away)), math.sqrt(2.0 / math.pi))):
-        if spread > alike:
-            return [float(score) for score in factor * (x - middle) / spread]
-    return [0.0] * len(x)
+    for found, factor in ((float(np.median(away)), 0.6745), (float(np.mean(away)), math.sqrt(2.0 / math.pi))):
+        if found > alike:
+            return middle, found / factor
+    return middle, 0.0
+
+
+def modified_scores(values: Sequence[float]) -> list[float]:
+    """Modified z-score of every value, in the order given; 0 if all values are equal."""
+    middle, one = spread(values)
+    return [(x - middle) / one if one else 0.0 for x in values]
+
+
+def margin(judged: Judged, values: Sequence[float]) -> float:
+    """Distance from the median beyond which a value is an outlier."""
+    middle, one = spread(values)
+    return max(BEYOND * one, math.log1p(MATTERS_ERROR) if judged.error else MATTERS * abs(middle))
 
 
 def find(units: Mapping[str, Mapping[str, object]]) -> dict[str, str] | None:
@@ -80,10 +92,10 @@ def find(units: Mapping[str, Mapping[str, object]]) -> dict[str, str] | None:
         values = {name: value for name, figures in units.items() if (value := judged.value(figures)) is not None}
         if len(values) < FEWEST:
             continue
-        middle = float(np.median(list(values.values())))
-        matters = math.log1p(MATTERS_ERROR) if judged.error else MATTERS * abs(middle)
-        for name, score in zip(values, modified_scores(list(values.values())), strict=True):
-            if (score if judged.error else abs(score)) > BEYOND and abs(values[name] - middle) > matters:
+        listed = list(values.values())
+        far = margin(judged, listed)
+        for name, score in zip(values, modified_scores(listed), strict=True):
+            if score and (score > 0.0 or not judged.error) and abs(values[name] - spread(listed)[0]) > far:
                 number = float(units[name][judged.column])  # type: ignore[arg-type]
                 found.setdefault(name, []).append(f"{judged.words} {number:.4g} (z {score:+.1f})")
     return {name: "; ".join(words) for name, words in found.items()}

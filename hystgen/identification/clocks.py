@@ -105,7 +105,7 @@ def told(record: Record, asked: float | str | None) -> Record:
             return record
         said = found.sentence(record)
         if asked is None:
-            advice = "sample both with one clock, or take it out with --clock-skew auto"
+            advice = "sample both with one clock, or remove it with --clock-skew auto"
             return replace(record, notes=(*record.notes, f"{said}; {advice}"))
         slope = found.slope
     else:

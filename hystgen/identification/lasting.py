@@ -78,7 +78,7 @@ WORDS = range(8, 49)
 
 @dataclass(frozen=True)
 class Steps:
-    """Lasting steps of one record: `at`, the first sample behind each, `sizes` (k,), and the counter's `modulus`, None
+    """Lasting steps of one record: `at`, the first sample after each, `sizes` (k,), and the counter's `modulus`, None
     if it is not a counter that wraps."""
 
     at: Indices
@@ -111,7 +111,7 @@ class Steps:
             more = f" and {len(self.at) - 4} more" if len(self.at) > 4 else ""
             what = f"y steps by {sizes[0]} at {place}, {', '.join(some)}{more}, and stays there"
         return (
-            f"{what} although the drive moves on evenly, like a sensor that slips by a fringe or is zeroed again; "
+            f"{what} although the drive moves on evenly, as when a sensor slips by a fringe or is re-zeroed; "
             "bridged by an offset after each step"
         )
 
@@ -267,7 +267,7 @@ def _without_returns(at: Indices, move: Array, samples: int) -> Indices:
 
 @dataclass(frozen=True)
 class _Whole:
-    """A fit to a whole record of plays, a drift and a step behind each sample `at`: the steps' `sizes` (k,), and the
+    """A fit to a whole record of plays, a drift and a step after each sample `at`: the steps' `sizes` (k,), and the
     `rms` error."""
 
     sizes: Array

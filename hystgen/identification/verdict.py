@@ -92,7 +92,8 @@ def verdict(
         whole = {each.course.name for each in judged}.isdisjoint(each.course.name for each in own)
         alone = whole or _rms([each.error for each in own]) > pi.CLEARLY * _line(own, own)
         if left > pi.CLEARLY * line and alone:
-            return Verdict("missing", f"{off} and a straight line by {line:.3g}{u}, hardly more", True)
+            hardly = "hardly more" if line > left else "no more"
+            return Verdict("missing", f"{off} and a straight line by {line:.3g}{u}, {hardly}", True)
         above = f"{left / noise:.2g} times" if left <= 100.0 * noise else "far above"
         return Verdict("missing", f"{off}, {above} the noise")
     if not held:

@@ -221,7 +221,8 @@ def _table(reading: Reading) -> Table:
             raise reading.refuse("is empty; record again, or give another file")
         read = formats.reader(reading, start, suffix)
         if reading.part and read not in formats.WITH_PARTS:
-            raise reading.refuse(f"has no parts, of which {printable(reading.part)} could be one; give the file alone")
+            part = printable(reading.part)
+            raise reading.refuse(f"has no parts, so it cannot contain {part}; give the path of the file alone")
         return read(reading, stream)
 
 

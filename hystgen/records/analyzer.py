@@ -39,7 +39,7 @@ def read_aixacct(reading: Reading, stream: IO[bytes]) -> Table:
     loops = {loop.name: loop for loop in _loops(lines)}
     if not loops:
         raise reading.refuse("is an aixACCT file without a table of samples; export the measured curves with it")
-    name = reading.take_part("table", list(loops), "one file is one experiment; name one behind the file")
+    name = reading.take_part("table", list(loops), "one file is one experiment; append its name to the path")
     loop = loops[name]
     reading.understood(f"aixACCT {name}" if len(loops) > 1 else "aixACCT table")
     columns = []

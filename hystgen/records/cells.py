@@ -107,7 +107,7 @@ class Clock:
             near = 0 < step <= CHANGED_WITHIN * self._step and told % HOUR < step
             if self._first is not None and near and self._step < SLOWEST:
                 self._shift += change
-                self.notes += (f"the clock was put {said} by an hour; it was taken as running on",)
+                self.notes += (f"the clock was set {said} by an hour; the times were read as if it had not been",)
                 return time + change
         return time
 

@@ -29,7 +29,7 @@ Reader = Callable[[Reading, IO[bytes]], Table]
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 USER_BLOCKS = (0, 512, 1024, 2048)
-"""[bytes] Where an HDF5 file may begin, behind a header of another program."""
+"""[bytes] Where an HDF5 file may begin, after a header of another program."""
 
 
 def _any_mat(reading: Reading, stream: IO[bytes]) -> Table:
@@ -93,7 +93,7 @@ FOREIGN: Mapping[bytes, str] = {
     b"\x28\xb5\x2f\xfd": "is packed with Zstandard; unpack it with zstd -d",
     b"7z\xbc\xaf\x27\x1c": "is a 7-Zip archive; unpack it, or pack it as zip",
     b"Rar!\x1a\x07": "is a RAR archive; unpack it, or pack it as zip",
-    b"TDSh": "is the index of a TDMS file; give the file without _index beside it",
+    b"TDSh": "is the index of a TDMS file; give the .tdms file beside it",
     b"\x0e\x03\x13\x01": "is an HDF4 file; convert it with h4toh5convert, or export CSV",
     b":WFM#": "is a waveform file of a Tektronix oscilloscope; save the waveforms as CSV",
     b"SQLite format 3\0": "is an SQLite database; export the table as CSV",

@@ -32,6 +32,6 @@ def advice(reading: Reading, objects: Mapping[str, str]) -> str:
     typed = TYPE.get(objects[first], OTHERWISE).format(name=first, file=f"{Path(reading.file).stem}_columns.mat")
     of = ", ".join(f"{printable(name)} ({kind})" for name, kind in objects.items())
     return (
-        f"keeps its signals in MATLAB objects, which only MATLAB can read: {of}; type there: {typed} and give "
+        f"keeps its signals in MATLAB objects, which only MATLAB can read: {of}; in MATLAB, type: {typed} and give "
         f"{Path(reading.file).stem}_columns.mat"
     )

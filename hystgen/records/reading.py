@@ -101,7 +101,7 @@ class Reading:
     for "no value", a phrase naming them; `points`: whether the file may lack a time; `read_as`: interpretations that
     the file does not state plainly; `channel`: whether the file holds one channel of a record in several files;
     `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
-    unpacked; `part`: the table, sheet or member that the user names behind the file; `origin`: nanoseconds since year 1
+    unpacked; `part`: the table, sheet or member that the user appends to the path; `origin`: nanoseconds since year 1
     of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it.
     """
 
@@ -153,7 +153,7 @@ class Reading:
         """The error to raise for files whose package is not installed; `others`: formats that do not need it."""
         return self.refuse(f"{files} files need the package {package}; {extras.install(extra)}, or export {others}")
 
-    def take_part(self, what: str, names: Sequence[str], advice: str = "name one behind the file") -> str:
+    def take_part(self, what: str, names: Sequence[str], advice: str = "append its name to the path") -> str:
         """The one of several tables in a file that is to be read: the only one, or the one that the user names.
 
         Raises RecordError with all names if it is not clear which.

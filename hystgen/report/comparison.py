@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, ParamSpec
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,8 @@ from hystgen.basics import drawing
 from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
 from hystgen.comparison import LINE, Comparison, Deviation
-from hystgen.report.html import HtmlTable, Listing, Picture, Section, Text, page
+from hystgen.report.html import HtmlTable, Listing, Section, Text, drawn, page, presented
+from hystgen.report.viewer import Viewed, Viewer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,21 +36,6 @@ ROOM = 1.08
 
 PAGE = "report.html"
 
-P = ParamSpec("P")
-
-
-def _with_page(find: Callable[P, Comparison]) -> Callable[P, Comparison]:
-    @functools.wraps(find)
-    def found(*given: P.args, **named: P.kwargs) -> Comparison:
-        return replace(find(*given, **named), page=html, draw=figure)
-
-    return found
-
-
-compare = _with_page(comparison.compare)
-"""`hystgen.compare`: the comparison, with a page to write and a picture to draw."""
-
-
 def figure(found: Comparison, width: float = WIDE) -> Figure:
     """The rms deviation of every model beside the noise, and below it every model's deviation over time, on one scale.
 
@@ -61,8 +45,8 @@ def figure(found: Comparison, width: float = WIDE) -> Figure:
     across = 1 if width == NARROW else 2 if number in (2, 4) else min(SIDE_BY_SIDE, number)
     down = -(-number // across)
     bars = 0.8 + 0.3 * (number + 1)
-    drawn = drawing.figure(width, bars + 2.3 * down)
-    top, below = drawn.subfigures(2, 1, squeeze=False, height_ratios=(bars, 2.3 * down))[:, 0]
+    whole = drawing.figure(width, bars + 2.3 * down)
+    top, below = whole.subfigures(2, 1, squeeze=False, height_ratios=(bars, 2.3 * down))[:, 0]
     _bars(top.subplots(), found, width)
     panels = below.subplots(down, across, sharex=True, sharey=True, squeeze=False)
     most = ROOM * max(max(each.most for each in found.models), found.noise)
@@ -78,15 +62,14 @@ def figure(found: Comparison, width: float = WIDE) -> Figure:
         if k + across >= number:
             axes.set_xlabel("time compared (s), record after record" if len(found.records) > 1 else "time compared (s)")
             axes.tick_params(labelbottom=True)
-    return drawn
+    return whole
 
 
 def _bars(axes: Axes, found: Comparison, width: float) -> None:
     """The rms deviation of the straight line and of every model, on a logarithmic axis, and the noise."""
     every = (found.line, *found.models)
-    closest = {found.models[0].name, *(each.name for each in found.tied)}
     for k, each in enumerate(every):
-        colour = drawing.RESIDUAL if each.name in closest else drawing.QUIET if each is found.line else drawing.MODEL
+        colour = drawing.QUIET if each is found.line else _colour(found, each)
         axes.plot(max(each.rms, 1e-300), k, "o", color=colour, markersize=8)
         place = max(each.rms, 1e-300), k
         axes.annotate(f"{each.rms:.3g}", place, (8.0, 0.0), textcoords="offset points", va="center", fontsize=9)
@@ -108,12 +91,17 @@ def _over_time(axes: Axes, found: Comparison, model: Deviation) -> None:
         first, last = np.flatnonzero(np.isfinite(error))[[0, -1]].tolist()
         chosen = drawing.kept(first, last + 1, error)
         t = record.t - record.t[first] + start
-        axes.plot(t[chosen], error[chosen], color=drawing.RESIDUAL, linewidth=0.8)
+        axes.plot(t[chosen], error[chosen], color=_colour(found, model), linewidth=0.8)
         start = float(t[last]) + gap
         if record is not found.records[-1]:
             axes.axvline(start - 0.5 * gap, color=drawing.IGNORED, linewidth=0.8)
     for side in (found.noise, -found.noise):
         axes.axhline(side, color=drawing.FAULT, linewidth=0.8, linestyle="--")
+
+
+def _colour(found: Comparison, model: Deviation) -> str:
+    """Green for the closest model and those that cannot be told from it."""
+    return drawing.RESIDUAL if model in (found.models[0], *found.tied) else drawing.MODEL
 
 
 def _short(name: str, most: int) -> str:
@@ -123,26 +111,25 @@ def _short(name: str, most: int) -> str:
 
 def html(found: Comparison) -> str:
     """The page. Raises PlotError without matplotlib."""
-    with drawing.styled():
-        wide, narrow = (drawing.content(figure(found, width), "svg") for width in (WIDE, NARROW))
     names = ", ".join(record.name for record in found.records)
-    picture = Picture(
-        "deviations", wide, narrow,
-        f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and what cannot be told "
-        "from it. Below: measured minus model over time, on one scale for all models; dashed: the noise, 1 sd. Samples "
-        "that are not compared are left out.",
+    picture = drawn(
+        "deviations", partial(figure, found), (WIDE, NARROW),
+        f"Above: rms deviation of every model and of a {LINE} on {names}; green: the closest, and any that cannot be "
+        "told from it. Below: measured minus model over time, on one scale for all models; dashed: the noise, 1 sd. "
+        "Samples that are not compared are left out.",
         "The rms deviation of each model beside the noise, and panels with each model's deviation over time.",
     )
     rows = found.rows()
     noise = f"The noise of the records is {found.noise:.3g}{f' {found.unit}' if found.unit else ''} rms."
     free = (
-        "Nothing is fitted to these records but the offset of each and, unless the history is given, the state in "
-        f"which it starts. The {LINE} has one slope for all of them, the best."
+        "On these records, only the offset of each and, unless the history is given, its start state are fitted. The "
+        f"{LINE} has one slope for all of them, by least squares."
     )
-    marked = None if found.tied else rows.index(next(row for row in rows if row[0] == found.models[0].name))
+    marked = None if found.tied else [row[0] for row in rows[1:]].index(found.models[0].name)
     sections = [
         Section("Side by side", [HtmlTable(rows, (0, 1), marked), Text(noise), Text(free)]),
         Section("Deviations", [picture]),
+        Section("Zoom and read values", [_zoom(found)]),
         Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same records and models give the same page.")]),
     ]
@@ -156,3 +143,18 @@ def _next_step(found: Comparison) -> list[Text]:
         return []
     name = best.name if best.name.endswith((".yaml", ".yml")) else "params.yaml"
     return [Text("Your next step: write the compensator as C.", f"hystgen emit {name} -o firmware/")]
+
+
+def _zoom(found: Comparison) -> Viewer:
+    """The records with every model, the closest last, in the colour of a single model."""
+    shown = [
+        Viewed(each.name, "compared", each.t, each.v, each.y, {
+            model.name: each.y - model.errors[k] for model in reversed(found.models)
+        })
+        for k, each in enumerate(found.records)
+    ]
+    return Viewer(shown, (found.drive_unit, found.unit), found.noise)
+
+
+compare = presented(comparison.compare, html, figure)
+"""`hystgen.compare`: the comparison, with a page to write and a picture to draw."""

@@ -168,7 +168,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text("What they mean for a compensator:"),
         HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
-        else Text("Error of the motion with the compensator:", "hystgen track params.yaml RECORDS"),
+        else Text("Error of the motion with the compensator:", "hystgen track params.yaml RECORDS -o tracking/"),
         Text(
             "Their parameters. The intervals account for correlated residuals and for free weights, but not for other "
             "shapes that may fit as well:"

@@ -121,7 +121,7 @@ def overlay(found: Diagnosis, width: float) -> Figure:
             top.plot(t, (each.y - each.before)[chosen], color=BEFORE, linewidth=0.9, label="refitted")
         top.plot(t, (each.y - each.after)[chosen], label=what, **drawing.LINES["model"])
         top.set(ylabel=label("displacement", unit))
-        top.set_title(each.name, pad=8 if width == WIDE else 22)
+        top.set_title(each.name, pad=8 if width == WIDE else 34)
         drawing.legend_above(top, 3 if width == WIDE else 2)
         if named:
             bottom.plot(t, each.before[chosen], color=BEFORE, linewidth=0.8, label="refitted")
@@ -435,7 +435,7 @@ def frequency(found: Diagnosis, width: float) -> Figure:
     if last is not None:
         panels.mark_mains(axes, *last, lines)
     axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
-    axes.set_title(each.name, pad=8 if width == WIDE else 22)
+    axes.set_title(each.name, pad=8 if width == WIDE else 34)
     drawing.legend_above(axes, 3 if width == WIDE else 2)
     return drawn
 
@@ -476,24 +476,24 @@ def caption(found: Diagnosis, name: str) -> str:
         + (", and with one effect after another; dotted: the part that each step removes" if named else "")
         + ". The dashed line is the noise, measured without a model.",
         "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted, "
-        "then the stretch with the largest error, shaded, less the straight line through the record.",
-        "deviation": "The held-out record on which the refitted model does worst, over the drive, less the straight "
-        "line through it, and below the error"
+        "then the stretch with the largest error, shaded, as deviation from the straight line through the record.",
+        "deviation": "The held-out record on which the refitted model does worst: over the drive, its deviation from "
+        "the straight line through it, and below, the error"
         + (", before and after on one scale" if named else "")
-        + ". Colours: how fast the drive moves. An error whose colours part depends on speed.",
+        + ". Colours: how fast the drive moves. Where the colours separate, the error depends on speed.",
         "records": "rms error of every record, against the noise.",
         "time": "rms error in stretches of the records over the session.",
-        "against": "Mean and scatter of the error on all records against possible causes. A mean that leaves the "
-        "dashed band of the noise, or a scatter that widens, is structure; lines end where there are too few samples. "
-        "Loop centre: the middle between the last two reversals of the drive. While the drive rests, the error is "
-        "counted in the direction of its last move.",
+        "against": "Mean and scatter of the error on all records against possible causes. Wherever the mean leaves "
+        "the dashed band of the noise, or the scatter widens, the error is not noise; lines end where samples are too "
+        "few. Loop centre: midpoint of the last two reversals of the drive. While the drive rests, samples count as "
+        "moving in the last direction.",
         "frequency": "Spectral density of the error on the held-out record on which the refitted model does worst. "
         + _mains(found),
         "bode": "Gain and phase from the motion of the refitted model to the measured motion and to that of the model "
         f"with the effects, where at least {100 * panels.FOLLOWS:.0f} % of the motion's power follows; dashed: the "
-        "effects by themselves. The refitted model lacks these effects, so they show as they are measured.",
-        "stops": "Motion after the drive has stopped, from its first moments on, over the logarithm of time, in the "
-        "longest holds: measured, and with and without the effect.",
+        "effects by themselves. The refitted model lacks these effects, so the measured curve shows them.",
+        "stops": "Motion after the drive has stopped, on a logarithmic time axis, in the longest holds: measured, "
+        "and with and without the effect.",
     }[name]
 
 
@@ -512,13 +512,13 @@ def _lines(found: Diagnosis, last: float) -> list[float]:
 ALTERNATIVES = {
     "gap": "The held-out error after each step, down to the noise.",
     "overlay": "Measured and predicted displacement over time, the error, and the worst stretch enlarged.",
-    "deviation": "Measured and predicted displacement over the drive less the straight line, coloured by speed, and "
-    "the error below.",
+    "deviation": "Deviation of measured and predicted displacement from a straight line over the drive, coloured by "
+    "speed, and the error below.",
     "records": "Points for the rms error of every record, with the noise as a line.",
     "time": "rms error over the session, with the noise as a line.",
     "against": "Six panels of binned errors against drive, rate, displacement, loop centre, session time and time "
     "since the drive stopped, with the noise.",
     "frequency": "Spectral density of the error, with that of white noise and the mains marked.",
     "bode": "Gain and phase over frequency, measured, with the effects, and of the effects alone, with their corners.",
-    "stops": "Motion after stops of the drive over the logarithm of time, measured, and with and without the effect.",
+    "stops": "Motion after stops of the drive on a logarithmic time axis, measured, and with and without the effect.",
 }

@@ -144,15 +144,15 @@ def loop_panel(axes: Axes, each: Shown, units: Units) -> None:
 
 
 def deviation_panel(axes: Axes, each: Shown, units: Units, top: float) -> PathCollection:
-    """Measured, coloured by speed up to `top`, and model over the drive, less the straight line through the measured
-    loop; returns what a colour bar needs."""
+    """Deviation of measurement, coloured by speed up to `top`, and model from the straight line through the measured
+    loop, over the drive; returns what a colour bar needs."""
     measured = np.where(each.used.compared, each.measured, np.nan)
     line = panels.line_of(each.drive, measured)
     points = panels.by_speed(axes, each.drive, measured - line, np.abs(each.rate), top, "measured, by speed")
     model = np.where(each.used.compared, each.model - line, np.nan)
     panels.over_drive(axes, each.drive, model, each.used.parts, "model")
     axes.set(xlabel=label("drive", units.input), ylabel=label("displacement \N{MINUS SIGN} line", units.output))
-    axes.set_title("Less the straight line", pad=20)
+    axes.set_title("Deviation from the straight line", pad=20)
     drawing.legend_above(axes)
     return points
 

@@ -3,14 +3,35 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import dataclass
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from markupsafe import Markup
 
+from hystgen.basics import drawing
+from hystgen.basics.presented import Presented
 from hystgen.emission import runtime
 from hystgen.report import viewer
 from hystgen.report.viewer import Viewer
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+R = TypeVar("R", bound=Presented)
+
+
+def presented(find: Callable[P, R], page: Callable[[R], str], draw: Callable[[R], Figure]) -> Callable[P, R]:
+    """`find`, whose results get this page and this picture."""
+
+    @functools.wraps(find)
+    def found(*given: P.args, **named: P.kwargs) -> R:
+        made = find(*given, **named)
+        return replace(made, page=functools.partial(page, made), draw=functools.partial(draw, made))
+
+    return found
 
 
 @dataclass(frozen=True)
@@ -50,6 +71,15 @@ class Picture:
     caption: str
     alt: str
     kind: str = "figure"
+
+
+def drawn(
+    name: str, draw: Callable[[float], Figure], widths: tuple[float, float], caption: str, alt: str
+) -> Picture:
+    """The picture that `draw` makes at the width of a screen and of a phone, in inches. Raises PlotError."""
+    with drawing.styled():
+        wide, narrow = (drawing.content(draw(width), "svg") for width in widths)
+    return Picture(name, wide, narrow, caption, alt)
 
 
 @dataclass(frozen=True)

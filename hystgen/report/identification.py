@@ -340,14 +340,15 @@ def _errors(shown: Sequence[Shown], fit: Fit) -> str:
 def _loop_caption(fit: Fit, shown: Sequence[Shown]) -> str:
     return (
         "Measured loops and the model's, from a free run over the measured drive with a free offset: "
-        f"{_errors(shown, fit)}. Beside each loop, the same samples and the model less the straight line through the "
-        f"measured ones, which enlarges the difference; colours: how fast the drive moves. Only compared samples are "
-        f"drawn.{_several(shown)}"
+        f"{_errors(shown, fit)}. Beside each loop, the deviation of the same samples and of the model from the "
+        "straight line through the measured ones, which enlarges the difference; colours: how fast the drive moves. "
+        f"Only compared samples are drawn.{_several(shown)}"
     )
 
 
 def _loop_alt(fit: Fit, shown: Sequence[Shown]) -> str:
-    return f"Displacement over drive, measured and model, and less the straight line: {_errors(shown, fit)}"
+    errors = _errors(shown, fit)
+    return f"Displacement over drive, measured and model, and their deviation from the straight line: {errors}"
 
 
 def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
@@ -370,7 +371,7 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
         "Measured and model over time; below, measured minus model where samples were compared, then the stretch "
-        "with the largest error, shaded, with as much before and behind it, less the record's straight line"
+        "with the largest error, shaded, with as much before and after it, as deviation from the record's straight line"
         f"{''.join(f'; {each}' for each in dict.fromkeys(drawn))}. {'; '.join(said)}.{_several(shown)}"
     )
 

@@ -96,8 +96,8 @@ def stretch_panel(
     axes: Axes, t: Array, drive: Array, lines: Sequence[tuple[str, Array, drawing.Style]], error: Array,
     unit: str | None, pad: float = 8.0,
 ) -> tuple[int, int]:
-    """The worst stretch of `error` with as much before and behind it, less the straight line through the first of
-    `lines` over the drive; returns the samples of the stretch. `pad`: room in points between panel and title."""
+    """The worst stretch of `error` with as much before and after it, as deviation from the straight line through the
+    first of `lines` over the drive; returns the samples of the stretch. `pad`: points between panel and title."""
     first, last = worst_stretch(error)
     half = (last - first) // 2
     here = slice(max(first - half, 0), min(last + half, len(t)))
@@ -184,7 +184,7 @@ def mains_words(hertz: Array, values: Array, known: Sequence[float] = ()) -> str
     """A sentence on the mains, for a caption; `known`: as for `mark_mains`."""
     marked = mains(hertz)
     if not marked:
-        apart = "these samples are too few or too slow to tell the mains (50 or 60 Hz) from other frequencies"
+        apart = "the record is too short, or sampled too slowly, to tell the mains (50 or 60 Hz) from other frequencies"
         return f"No mains are marked: {apart}."
     others = [line for line in marked if not any(abs(line - other) < APART * float(hertz[0]) for other in known)]
     peaks = [f"{line:g}" for line in others if raised(hertz, values, line)]
@@ -238,6 +238,6 @@ windows give a gain within 13 % (1 sd: `sqrt((1 - c)/(2 n c))` for coherence c a
 
 
 def even_in_log(t: Array, count: int) -> list[slice]:
-    """Groups of samples, evenly spaced over the logarithm of a time t > 0 (N,) that rises; none is empty."""
+    """Groups of samples, evenly spaced in the logarithm of an increasing time t > 0 (N,); none is empty."""
     edges = np.unique(np.searchsorted(t, np.geomspace(t[0], t[-1], count + 1)))
     return [slice(int(a), int(b)) for a, b in itertools.pairwise([*edges[:-1], len(t)])]

@@ -1,4 +1,4 @@
-"""Pictures of a fit, and of a compensator's tracking over records."""
+"""Pictures of a fit and of a simulation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from hystgen.arithmetic import FIXED
 from hystgen.basics import drawing
 from hystgen.basics.drawing import Array, label
 from hystgen.report import fit_figures, panels
-from hystgen.tracking import LINE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,43 +21,10 @@ if TYPE_CHECKING:
     from hystgen.identification import Fit
     from hystgen.model import Model
     from hystgen.records import Record
-    from hystgen.tracking import Tracking
 
 NEAR = 0.1
 """[fraction of a range] A limit is drawn if the signal comes this near to it: further away, its line would only flatten
 the signal."""
-
-
-def tracking_figure(tracking: Tracking) -> Figure:
-    """The motion in each record, the tracking error of each compensator over time on one scale, and the same enlarged
-    without the straight line."""
-    figure = drawing.figure(9.0, 1.0 + 5.0 * len(tracking.records))
-    grid = figure.subplots(3 * len(tracking.records), 1, squeeze=False)[:, 0]
-    colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
-    for motion, error, enlarged, each in zip(grid[::3], grid[1::3], grid[2::3], tracking.records, strict=True):
-        motion.sharex(enlarged)
-        error.sharex(enlarged)
-        chosen = drawing.kept(0, len(each.t), each.reference)
-        motion.plot(each.t[chosen], each.reference[chosen], color=drawing.MEASURED, linewidth=1.0)
-        motion.set(title=each.name, ylabel=label("reference", tracking.unit))
-        most = 0.0
-        for (which, values), colour in zip(each.errors.items(), colours, strict=True):
-            words = f"{which}: {each.rms(which):.3g} % rms"
-            chosen = drawing.kept(0, len(each.t), values)
-            error.plot(each.t[chosen], 100.0 * values[chosen] / each.span, color=colour, linewidth=1.0, label=words)
-            if which != LINE:
-                enlarged.plot(each.t[chosen], 100.0 * values[chosen] / each.span, color=colour, linewidth=1.0)
-                most = max(most, each.most(which))
-        for axes in (motion, error):
-            axes.tick_params(labelbottom=False)
-        error.set(ylabel="error (% of span)")
-        drawing.legend_above(error, 3)
-        if most > 0.0:  # the errors before the memory is known may be larger than all others
-            enlarged.set_ylim(-1.1 * most, 1.1 * most)
-        enlarged.set_title(f"Enlarged, without the {LINE}", fontsize=9.5)
-        enlarged.set(xlabel="time (s)", ylabel="error (% of span)")
-    figure.align_ylabels(grid)
-    return figure
 
 
 def simulation_figure(
@@ -117,8 +83,8 @@ def _mark(axes: Axes, ends: tuple[float, float], x: Array, what: str) -> None:
 
 
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
-    """Measured and predicted loop of one record, the same less the straight line by speed, residuals over time, and the
-    weights.
+    """Measured and predicted loop of one record, their deviation from the straight line by speed, residuals over time,
+    and the weights.
 
     `records`: the fitted records, then the held-out ones; the loop is from a held-out record if there is one.
     """

@@ -2,7 +2,7 @@
 // Zoom into the records of a report and read their values. Each record is drawn from the extremes of blocks of samples,
 // so that no peak is lost at any zoom. Text enters the page as text alone.
 (() => {
-const COLOURS = ["#c2410c", "#8a929c", "#5b4a91", "#3f7d3a"], MEASURED = "#7ba1c9", DRIVE = "#5b4a91", FAULT = "#b01030";
+const COLOURS = ["#c2410c", "#8a929c", "#5b4a91", "#3f7d3a", "#e0a526", "#1b1f24"], MEASURED = "#7ba1c9", DRIVE = "#5b4a91", FAULT = "#b01030";
 const FACTOR = 8, GAP = 5, LEFT = 66, RIGHT = 10, KEYS = {ArrowLeft: -1, ArrowRight: 1};
 
 // Samples of a channel: variable-length numbers, zigzag, summed `order` times
@@ -70,7 +70,7 @@ function make(tag, parent, text, attributes) {
 }
 
 // The last of several models is the one that the report is about
-const colour = (k, names) => COLOURS[names.length - 1 - k];
+const colour = (k, names) => COLOURS[(names.length - 1 - k) % COLOURS.length];
 const withUnit = (name, unit) => unit ? `${name} (${unit})` : name;
 const digits = step => Math.min(12, Math.max(0, Math.ceil(-Math.log10(step))));
 const plain = (value, step) => value === value ? value.toFixed(digits(step)) : "not compared";
@@ -83,7 +83,7 @@ function ticks(low, high, most) {
 }
 
 function start(root) {
-  const given = JSON.parse(root.dataset.viewer), [input, output] = given.units;
+  const given = JSON.parse(root.dataset.viewer), [input, output] = given.units, [measured, difference] = given.words;
   let record = given.records[0], data = opened(record), from, to, cursor = 0;
   const [off, how] = root.children;
   off.remove();
@@ -100,11 +100,14 @@ function start(root) {
   button("\u25b6", "later", () => pan(0.5));
   button("whole", "whole record", home);
   const label = make("label", bar), bent = make("input", label, "", {type: "checkbox", checked: ""});
-  label.append(" less the straight line");
+  label.append(" deviation from the straight line");
+  const legend = make("div", root, "", {class: "legend"});
+  [[measured, MEASURED], ...given.models.map((name, k) => [name, colour(k, given.models)])].forEach(([name, ink]) =>
+    make("span", legend, name).style.setProperty("--ink", ink));
   const area = make("div", root, "", {class: "plots"});
   const time = make("canvas", area, "", {
     class: "time", tabindex: "0", role: "application", "aria-roledescription": "zoomable plot",
-    "aria-label": "Measured and model, error and drive over time. Left and right arrows: to the next point; "
+    "aria-label": "Displacement, error and drive over time. Left and right arrows: to the next point; "
       + "with Shift: half a window; plus and minus: zoom; Home: whole record; End: last sample.",
   });
   const values = make("output", area, "", {"aria-live": "polite"});
@@ -114,6 +117,8 @@ function start(root) {
 
   const span = () => [data.t[0], data.t[data.t.length - 1]];
   function home() { [from, to] = span(); }
+  // The first sample that was compared
+  function first() { cursor = Math.max(data.errors[0][0].low.findIndex(x => x === x), 0); }
   function look(a, b) {
     const [first, last] = span(), least = 4 * record.spacing, width = Math.min(Math.max(b - a, least), last - first);
     from = Math.min(Math.max((a + b - width) / 2, first), last - width);
@@ -185,7 +190,7 @@ function start(root) {
     c.fillStyle = "#3d4650";
     c.lineWidth = 1;
     c.textAlign = "right";
-    for (const [at, text] of ticks(low, high, Math.max(2, (y1 - y0) / 40))) {
+    for (const [at, text] of ticks(low, high, Math.max(5, (y1 - y0) / 40))) {
       c.beginPath(); c.moveTo(x0, py(at)); c.lineTo(x1, py(at)); c.stroke();
       c.fillText(text, x0 - 5, py(at) + 4);
     }
@@ -219,29 +224,19 @@ function start(root) {
     c.stroke();
   }
 
-  function legend(c, x, y, entries) {
-    c.textAlign = "right";
-    for (const [name, ink] of [...entries].reverse()) {
-      c.fillStyle = ink;
-      c.fillText(name, x, y);
-      x -= c.measureText(name).width + 12;
-    }
-  }
-
   function draw() {
     const [c, w, h] = cleared(time), wide = w - LEFT - RIGHT, shown = bent.checked ? data.bent : data.whole;
     const names = given.models, room = h - 34, dots = (to - from) / record.spacing < wide / 8;
     const strips = [[0, 0.46], [0.46, 0.76], [0.76, 1]].map(([a, b]) => [LEFT, w - RIGHT, 18 + a * room, b * room - 4]);
     const what = bent.checked ? "displacement \u2212 line" : "displacement";
     const panels = [
-      [narrow(w) ? output : withUnit(what, output), shown, [[MEASURED, 2.4], ...names.map((_, k) => [colour(k, names), 1.1])], [["measured", MEASURED], ...names.map((name, k) => [name, colour(k, names)])]],
-      [withUnit("error", output), data.errors, names.map((_, k) => [colour(k, names), 1.1]), []],
-      [withUnit("drive", input), [data.drive], [[DRIVE, 1.2]], []],
+      [withUnit(what, output), shown, [[MEASURED, 2.4], ...names.map((_, k) => [colour(k, names), 1.1])]],
+      [withUnit(difference, output), data.errors, names.map((_, k) => [colour(k, names), 1.1])],
+      [withUnit("drive", input), [data.drive], [[DRIVE, 1.2]]],
     ];
-    panels.forEach(([title, all, styles, entries], k) => {
+    panels.forEach(([title, all, styles], k) => {
       const box = strips[k], heights = k ? limits(all, wide) : compared(all, wide);
       const [px, py] = axes(c, box, heights, [from, to], title, k === 2 ? "time (s)" : "");
-      legend(c, box[1], box[2] - 5, entries);
       c.save();
       c.beginPath(); c.rect(box[0], box[2], box[1] - box[0], box[3] - box[2]); c.clip();
       all.forEach((levels, j) => line(c, levels, px, py, wide, styles[j][0], styles[j][1], dots));
@@ -259,8 +254,6 @@ function start(root) {
     drawLoop(what, shown);
     say();
   }
-
-  const narrow = w => w < 480;
 
   // The window over the drive: the extremes of each block at the middle of its drive
   function drawLoop(what, shown) {
@@ -291,10 +284,10 @@ function start(root) {
     const [v, y, ...models] = [data.v, data.y, ...data.models].map(x => x[cursor]), unit = x => x ? ` ${x}` : "";
     const steps = record.channels.map(each => each.step), said = [
       `time ${plain(data.t[cursor], record.tick)} s`, `drive ${plain(v, steps[0])}${unit(input)}`,
-      `measured ${plain(y, steps[1])}${y === y ? unit(output) : ""}`,
+      `${measured} ${plain(y, steps[1])}${y === y ? unit(output) : ""}`,
     ];
     models.forEach((m, k) => said.push(m === m
-      ? `${given.models[k]} ${plain(m, steps[k + 2])}${unit(output)}, error ${plain(y - m, steps[1])}${unit(output)}`
+      ? `${given.models[k]} ${plain(m, steps[k + 2])}${unit(output)}, ${difference} ${plain(y - m, steps[1])}${unit(output)}`
       : `${given.models[k]} not compared`));
     values.textContent = `${said.join("; ")}; window ${plain(from, record.tick)} to ${plain(to, record.tick)} s`;
   }
@@ -351,11 +344,12 @@ function start(root) {
   choice.addEventListener("change", () => {
     record = given.records[Number(choice.value)];
     data = opened(record);
-    cursor = 0;
+    first();
     home();
     draw();
   });
   bent.addEventListener("change", draw);
+  first();
   home();
   new ResizeObserver(draw).observe(area);
   draw();

@@ -47,11 +47,13 @@ class Viewed:
 
 @dataclass(frozen=True)
 class Viewer:
-    """The records of a page, all with the same models; `units`: of the drive and of the displacement, or None."""
+    """The records of a page, all with the same models; `units`: of the drive and of the displacement, or None;
+    `words`: for the displacement that the models are compared with, and for its difference from a model."""
 
     records: Sequence[Viewed]
     units: tuple[str | None, str | None]
     noise: float | None = None
+    words: tuple[str, str] = ("measured", "error")
     kind: str = "viewer"
 
     def packed(self) -> str:
@@ -60,6 +62,7 @@ class Viewer:
             {
                 "units": [unit or "" for unit in self.units],
                 "noise": None if self.noise is None else _short(self.noise),
+                "words": self.words,
                 "models": [*self.records[0].models],
                 "records": [_packed(each, self._share) for each in self.records],
             },

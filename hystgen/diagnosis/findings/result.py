@@ -302,7 +302,7 @@ class Diagnosis:
         if self._limits() or (self.verdict == "unexplained" and not self.result.effects):
             return "record drives in which every effect shows", "hystgen diagnose --plan params.yaml -o plan/"
         if self.not_emitted():
-            return "see the tracking error with the model", "hystgen track params.yaml RECORDS"
+            return "see the tracking error with the model", "hystgen track params.yaml RECORDS -o tracking/"
         return "write the compensator as C", "hystgen emit params.yaml -o firmware/"
 
     def uncertain(self) -> list[str]:

@@ -96,8 +96,8 @@ def _best(now: Fitted, name: str, records: Records) -> tuple[Tried, list[Tried]]
     tried = [each for each in tried if name in each.names] or [each for each in tried if name == effects.BEND]
     if not tried:
         raise IdentificationError(
-            f"{name} cannot be fitted: these records offer no shape of it to try; leave it out, or record drives that "
-            f"show it, which hystgen diagnose --plan writes"
+            f"{name} cannot be fitted: none of its shapes can be tried on these records; leave it out, or record "
+            "the drives that hystgen diagnose --plan writes"
         )
     best = selection.simplest_first(tried, records)[0]
     marked = tuple(replace(part, known=part.known or part.name == name) for part in best.fitted.structure.parts)

@@ -35,7 +35,7 @@ SHORTEST = 0.3
 LOGARITHMIC = "creep, logarithmic"
 
 PER_DECADE = 2
-"""States per decade of a logarithmic spectrum; their ripple about a straight line over log t is 0.1 % of its slope."""
+"""States per decade of a logarithmic spectrum; their ripple about a straight line in log t is 0.1 % of its slope."""
 
 
 @jit
@@ -167,11 +167,11 @@ class LogarithmicCreep(_Creep):
 
     The law is from the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric actuators
     for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal weights and
-    time constants spaced evenly over log t from t_min to t_max, and a gain chosen so that a step reaches its full
+    time constants evenly spaced in log t from t_min to t_max, and a gain chosen so that a step reaches its full
     height at t_0.
     """
 
-    shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
+    shape: Literal["logarithmic"] = Field(description="a spectrum of states, evenly spaced in log t")
     per_decade: NotNegative = Field(description="g, fraction of the play sum per decade of time", examples=[0.015])
     t0: Positive = Field(default=0.1, description="s after a step at which it has its full height")
     t_min: Positive = Field(default=1e-3, description="shortest time constant, s")

@@ -174,8 +174,9 @@ class Resonance(_Mode):
     def candidates(cls, about: About) -> list[Candidate]:
         """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
 
-        Starts are spaced evenly over log f. A faster or more damped mode does not visibly ring: in the records it is a
-        delay or a lag. A lightly damped mode rings long, and is found from the frequency at which the residual rings.
+        Starting frequencies are evenly spaced on a logarithmic scale. A faster or more damped mode does not visibly
+        ring: in the records it is a delay or a lag. A lightly damped mode rings long, and is found from the frequency
+        at which the residual rings.
         """
         low, high = _frequencies(about)
 

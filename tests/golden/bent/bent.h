@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 6f91255d09dcf1100096a43e37169cc6be06acee2da134591f479c7de6d2c313, without this line
+ * Text: sha256 3fafab28d26a5763b0b59cdfeea2b8da980e20a1df29c107e0e7b80d98fb572f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -19,10 +19,10 @@
  *     inverse instance  104 bytes of RAM
  *     forward step, worst case: 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
  *     inverse step, worst case: 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
- *     forward step, dearest: about 8260 instructions and 216 bytes of stack on a Cortex-M0+, 4409
+ *     forward step, costliest: about 8260 instructions and 216 bytes of stack on a Cortex-M0+, 4409
  *         and 204 on a Cortex-M4F, as measured for similar models
- *     inverse step, dearest: about 17519 instructions and 272 bytes of stack on a Cortex-M0+, 8767
- *         and 272 on a Cortex-M4F, as measured for similar models
+ *     inverse step, costliest: about 17519 instructions and 272 bytes of stack on a Cortex-M0+,
+ *         8767 and 272 on a Cortex-M4F, as measured for similar models
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
  * memory of the parameter file; reset restarts with all plays at 0. Not for targets that flush

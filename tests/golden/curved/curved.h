@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 4d244f6182c76c06c5ff6a60a0e845c7a2f49d6285d9e9b60db933bfee6c2384, without this line
+ * Text: sha256 2a5a7b054040c4aae7562d81ecf284c71f9c2365c1f1be2900832e09a059e9ee, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -24,7 +24,7 @@
  *     inverse instance  168 bytes of RAM
  *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3, the bit length of n)
- *     inverse step, dearest: about 1904 instructions and 248 bytes of stack on a Cortex-M0+, 902
+ *     inverse step, costliest: about 1904 instructions and 248 bytes of stack on a Cortex-M0+, 902
  *         and 112 on a Cortex-M4F, as measured for similar models
  * On an 8-bit AVR constants lie in RAM too: at most 2195 bytes of RAM in total, 33 of them for each
  * play

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 f73f111da50fe2fc4640322cd378ca691b099df022c1e9b9462156dccb67c8e6, without this line
+ * Text: sha256 2cc23c450f77238bf35825f223aab7b962dfca9d39f177161a4048bd29049faa, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -17,7 +17,7 @@
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3, the bit length
  *         of n)
- *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
+ *     inverse step, costliest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
  *         and 112 on a Cortex-M4F, as measured for similar models
  * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in total, 31 of them for each
  * play

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 477d7d05443fc0a229df8f43ffd75510c18431d36fb6d035e6fd37f61bf5b106, without this line
+ * Text: sha256 0538f50e1835f19d645c4ee9965c22c0b1e3cdbf2d03e2b009d37360447a22cc, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -18,7 +18,7 @@
  *     inverse instance  216 bytes of RAM
  *     inverse step, worst case: 34 multiplications, 60 comparisons (48 + 4 b, b = 3, the bit length
  *         of n), 1 tanh, 2 atanh
- *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
+ *     inverse step, costliest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
  *         and 120 on a Cortex-M4F, as measured for similar models
  * On an 8-bit AVR constants lie in RAM too: at most 1007 bytes of RAM in total, 31 of them for each
  * play
