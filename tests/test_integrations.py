@@ -194,7 +194,9 @@ def test_an_unknown_tool_gets_one_message_and_nothing_is_written(
 ) -> None:
     code, out, said = run("emit", *models, "-o", tmp_path / "fw", "--integration", words)
     assert (code, out, len(said.splitlines())) == (2, "", 1), said
-    assert said.endswith(f"is not one of {', '.join(INTEGRATIONS)}")
+    close = {"cmake,mesom": "meson", "CMake": "cmake", "cmake meson": "cmake or meson"}.get(words)
+    hint = f"; did you mean {close}?" if close else ""
+    assert said.endswith(f"is not one of {', '.join(INTEGRATIONS)}{hint}")
     assert not (tmp_path / "fw").exists()
     with pytest.raises(ValueError, match=r"integration 'mesom' is not one of cmake, meson, "):
         hystgen.emit(models, tmp_path / "fw", integration=("cmake", "mesom"))
@@ -611,3 +613,13 @@ def test_espidf_component_is_valid_and_builds(emitted: Path, tmp_path: Path) -> 
         assert (tmp_path / "packed" / f"{name}_0.1.0.tgz").is_file()
     (tmp_path / "components" / "stage_x" / "idf_component.yml").write_text('version: "first"\n')
     done(["compote", "manifest", "lint", "components"], tmp_path, code=1, IDF_TOOLS_PATH=tmp_path)
+
+
+def test_an_option_of_several_words_may_be_given_again(
+    models: list[Path], run: Callable[..., tuple[int, str, str]]
+) -> None:
+    """Of a repeated option, the command line would otherwise silently use only the last."""
+    again = ("--integration", "cmake", "--integration", " meson, zephyr")
+    once = run("emit", models[0], "--list-outputs", "--integration", "cmake,meson,zephyr")
+    assert run("emit", models[0], "--list-outputs", *again) == once
+    assert {"meson.build", "CMakeLists.txt"} <= {Path(line).name for line in once[1].splitlines()}

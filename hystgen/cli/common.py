@@ -125,6 +125,11 @@ def matched(_context: click.Context, _option: click.Parameter, value: tuple[str,
     return tuple(found)
 
 
+def words(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """The words of an option that takes several, separated by commas, given repeatedly, or both."""
+    return tuple(word.strip() for each in value for word in each.split(","))
+
+
 params_argument = click.argument("params", type=click.Path())
 several_params_argument = click.argument("params", nargs=-1, required=True, type=click.Path(), callback=matched)
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="print nothing but warnings and errors")

@@ -46,7 +46,8 @@ class Emitted:
 @common.optimize_option
 @common.layout_option
 @click.option(
-    "--integration", metavar="TOOL,..", help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS)
+    "--integration", multiple=True, callback=common.words, metavar="TOOL,..",
+    help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS),
 )
 @click.option(
     "--check", is_flag=True, help="write nothing; exit 1 and list the files that differ or that none of PARAMS writes"
@@ -59,7 +60,7 @@ class Emitted:
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
-    list_outputs: bool, quiet: bool, integration: str | None, **options: object,
+    list_outputs: bool, quiet: bool, integration: tuple[str, ...], **options: object,
 ) -> None:
     """Write the C files of models.
 
@@ -80,8 +81,8 @@ def emit(
             raise common.Failed("error: --junit reports what --check finds; add --check", 2)
         common.keep_inputs([junit_file], params)
         common.guarded(junit_file, partial(writing.check_writable, junit_file))
-    tools = options["integration"] = tuple(integration.split(",")) if integration is not None else ()
-    for tool in tools:
+    options["integration"] = integration
+    for tool in integration:
         common.guarded(output or ".", partial(arguments.choice, "integration", tool, INTEGRATIONS))
     models = common.for_each(params, partial(common.load_model, effects=effects))
     folders = [_folder(path, model, output) for path, model in zip(params, models, strict=True)]
