@@ -144,6 +144,12 @@ class Model:
                 "the model and its inverse in double precision"
             )
 
+    @property
+    def sample_time_advice(self) -> str:
+        """The line to add to a parameter file without a sample time: that of the records behind the model, if known."""
+        step = self.parameters.recorded_at
+        return "`sample_time: SECONDS`" if step is None else f"`sample_time: {step:.4g}` (recorded at {duration(step)})"
+
     def need_compensated(self, arithmetic: str, operator: str) -> None:
         """Raise an error with all reasons if an operator in `arithmetic` cannot include all of the model's effects.
 
@@ -153,12 +159,9 @@ class Model:
             return
         names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
-            step = self.parameters.recorded_at
-            own = "SECONDS" if step is None else f"{step:.4g}"
-            whose = "" if step is None else f" (recorded at {duration(step)})"
             raise EffectsError(
                 f"C for a model with effects ({names}) needs sample_time in the parameter file; add "
-                f"`sample_time: {own}`{whose}, the time in s between two calls of step"
+                f"{self.sample_time_advice}, the time in s between two calls of step"
             )
         if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(
