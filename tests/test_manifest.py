@@ -78,6 +78,10 @@ def test_a_manifest_is_checked_and_listed_like_the_c(tmp_path: Path) -> None:
     result = run(*command, "--check")
     assert result.exit_code == 1
     assert "plain_manifest.json was edited by hand" in result.output
+    result = run(*command[:-1], "--check")
+    assert "plain_manifest.json belongs to model plain but is not written with these options (add --manifest)" in (
+        result.output
+    )
     path.unlink()
     result = run(*command, "--check")
     assert result.exit_code == 1
