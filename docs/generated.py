@@ -92,7 +92,8 @@ def kind(node: dict[str, Any], names: dict[str, str]) -> str:
         if "prefixItems" in node:
             return f"list of {len(node['prefixItems'])}: {kind(node['prefixItems'][0], names)}"
         return f"list: {kind(node['items'], names)}"
-    word = {"string": "text", "integer": "whole number", "object": "mapping"}.get(node.get("type", ""), node.get("type", "any value"))
+    words = {"string": "text", "integer": "whole number", "object": "mapping"}
+    word = words.get(node.get("type", ""), node.get("type", "any value"))
     return word + limits(node)
 
 
@@ -259,8 +260,8 @@ def escaped(_app: Sphinx, _context: object, lines: list[str]) -> None:
 
 
 DIRECTIVES: dict[str, type[Directive]] = {
-    "parameter-keys": ParameterKeys, "manifest-keys": ManifestKeys, "effect-keys": EffectKeys, "status-bits": StatusBits, "cores": Cores,
-    "arithmetics": Arithmetics,
+    "parameter-keys": ParameterKeys, "manifest-keys": ManifestKeys, "effect-keys": EffectKeys,
+    "status-bits": StatusBits, "cores": Cores, "arithmetics": Arithmetics,
 }  # fmt: skip
 
 

@@ -85,7 +85,7 @@ class Manifest(_Entry):
     parameters_sha256: str = _HASH
     effects: tuple[str, ...] = Field(description="effects in the C, in the order of the parameter file")
     not_compensated: tuple[str, ...] = Field(description="a sentence for each effect that the C leaves out")
-    files: tuple[File, ...] = Field(description="the files of the C; packages for build tools hold copies of the same bytes")
+    files: tuple[File, ...] = Field(description="files of the C, of which packages for build tools hold copies")
     sample_time: float | None = Field(description="s between steps; null without effects")
     drive_range: tuple[float, float] = Field(description="drives that a step can return or take, in units of the drive")
     output_range: tuple[float, float] = Field(description="references or outputs, in units of the output")
