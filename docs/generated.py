@@ -161,7 +161,7 @@ class ManifestKeys(Generated):
 
     def lines(self) -> Iterator[str]:
         schema = manifest.schema()
-        names = {name: name.lower() for name in schema["$defs"]}
+        names = {"File": "files", "Bound": "bounds", "Figure": "figures", "AllowedDeviation": "misra"}
         yield "## Keys\n\n" + keys(schema, names)
         for name, title in names.items():
             node = schema["$defs"][name]

@@ -266,10 +266,13 @@ class Model:
         seconds = self.parameters.sample_time
         assert seconds is not None, "need_compensated asks for it"
         emit, (drive, output) = self.parameters.emit, self._lsb
-        if drive is None and emit.converter and emit.compensation.quiet and arithmetic not in FIXED:
+        if drive is None and emit.converter and emit.compensation.quiet:
+            from hystgen.compensator import fixed_tables
             from hystgen.compensator.converter import CodeLine
 
-            drive = float(abs(CodeLine.of(emit.converter.drive).step))
+            step = abs(CodeLine.of(emit.converter.drive).step)  # a drive that stands still has to do so there
+            if arithmetic not in FIXED or step >= fixed_tables.lsbs(self.cascade, arithmetic)[0]:
+                drive = float(step)
         return chain_tables.build(self.chain, arithmetic, seconds, emit.compensation, (drive, output), engine)
 
     def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:

@@ -248,6 +248,17 @@ def test_a_reference_in_another_unit_is_told_and_one_without_a_usable_code_refus
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+def test_a_quiet_drive_stands_still_at_the_steps_of_a_coarse_converter(arithmetic: str) -> None:
+    """Creep moves it on, one way; with the band of a finer code it would go to and fro on half of the samples."""
+    text = parameters(bits=12, effects=EFFECTS).replace("emit:\n", "emit:\n  compensation: {quiet: true}\n")
+    codes = np.concatenate([np.linspace(500, 1500, 500), np.full(2500, 1500)]).astype(int)
+    sent = Model(parse_parameters(text)).inverse_codes(codes, arithmetic)
+    moves = np.diff(sent[700:])
+    assert len(set(np.sign(moves[moves != 0]))) <= 1, "reversals at rest"
+    assert np.count_nonzero(moves) <= 25  # the creep left over, code by code
+
+
 def test_files_without_converters_keep_their_hash() -> None:
     text = parameters()
     assert "converter" in canonical_json(parse_parameters(text))
