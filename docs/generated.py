@@ -22,6 +22,7 @@ from sphinx.util.docutils import SphinxDirective
 import hystgen
 from hystgen import effects
 from hystgen.arithmetic import ARITHMETICS
+from hystgen.emission import manifest
 from hystgen.emission.calls import emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -91,7 +92,8 @@ def kind(node: dict[str, Any], names: dict[str, str]) -> str:
         if "prefixItems" in node:
             return f"list of {len(node['prefixItems'])}: {kind(node['prefixItems'][0], names)}"
         return f"list: {kind(node['items'], names)}"
-    word = {"string": "text", "integer": "whole number"}.get(node.get("type", ""), node.get("type", "any value"))
+    words = {"string": "text", "integer": "whole number", "object": "mapping"}
+    word = words.get(node.get("type", ""), node.get("type", "any value"))
     return word + limits(node)
 
 
@@ -152,6 +154,18 @@ class ParameterKeys(Generated):
         shapes = {shape.__name__ for each in effects.CATALOGUE for shape in effects.shapes(each)}
         if missing := unlisted - shapes:
             raise ConfigError(f"the parameter file has mappings without a section: {', '.join(sorted(missing))}")
+
+
+class ManifestKeys(Generated):
+    """Every key of a manifest, with a section for each mapping."""
+
+    def lines(self) -> Iterator[str]:
+        schema = manifest.schema()
+        names = {"File": "files", "Bound": "bounds", "Figure": "figures", "AllowedDeviation": "misra"}
+        yield "## Keys\n\n" + keys(schema, names)
+        for name, title in names.items():
+            node = schema["$defs"][name]
+            yield f"## {title}\n\n{' '.join(node['description'].split())}\n\n{keys(node, names)}"
 
 
 class EffectKeys(Generated):
@@ -246,8 +260,8 @@ def escaped(_app: Sphinx, _context: object, lines: list[str]) -> None:
 
 
 DIRECTIVES: dict[str, type[Directive]] = {
-    "parameter-keys": ParameterKeys, "effect-keys": EffectKeys, "status-bits": StatusBits, "cores": Cores,
-    "arithmetics": Arithmetics,
+    "parameter-keys": ParameterKeys, "manifest-keys": ManifestKeys, "effect-keys": EffectKeys,
+    "status-bits": StatusBits, "cores": Cores, "arithmetics": Arithmetics,
 }  # fmt: skip
 
 

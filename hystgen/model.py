@@ -144,6 +144,12 @@ class Model:
                 "the model and its inverse in double precision"
             )
 
+    @property
+    def sample_time_advice(self) -> str:
+        """The line to add to a parameter file without a sample time: that of the records behind the model, if known."""
+        step = self.parameters.recorded_at
+        return "`sample_time: SECONDS`" if step is None else f"`sample_time: {step:.4g}` (recorded at {duration(step)})"
+
     def need_compensated(self, arithmetic: str, operator: str) -> None:
         """Raise an error with all reasons if an operator in `arithmetic` cannot include all of the model's effects.
 
@@ -153,12 +159,9 @@ class Model:
             return
         names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
-            step = self.parameters.recorded_at
-            own = "SECONDS" if step is None else f"{step:.4g}"
-            whose = "" if step is None else f" (recorded at {duration(step)})"
             raise EffectsError(
                 f"C for a model with effects ({names}) needs sample_time in the parameter file; add "
-                f"`sample_time: {own}`{whose}, the time in s between two calls of step"
+                f"{self.sample_time_advice}, the time in s between two calls of step"
             )
         if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(
@@ -263,10 +266,13 @@ class Model:
         seconds = self.parameters.sample_time
         assert seconds is not None, "need_compensated asks for it"
         emit, (drive, output) = self.parameters.emit, self._lsb
-        if drive is None and emit.converter and emit.compensation.quiet and arithmetic not in FIXED:
+        if drive is None and emit.converter and emit.compensation.quiet:
+            from hystgen.compensator import fixed_tables
             from hystgen.compensator.converter import CodeLine
 
-            drive = float(abs(CodeLine.of(emit.converter.drive).step))
+            step = abs(CodeLine.of(emit.converter.drive).step)  # a drive that stands still has to do so there
+            if arithmetic not in FIXED or step >= fixed_tables.lsbs(self.cascade, arithmetic)[0]:
+                drive = float(step)
         return chain_tables.build(self.chain, arithmetic, seconds, emit.compensation, (drive, output), engine)
 
     def units_per_code(self, arithmetic: str, engine: str = "loop") -> tuple[float, float]:

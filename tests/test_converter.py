@@ -206,6 +206,7 @@ def test_a_committed_drive_at_the_end_of_the_range_sets_no_status_bit(tmp_path: 
 @pytest.mark.parametrize(("changes", "words"), [
     ({"drive": "[-10, 90]"}, "reaches -10.0 .. 90.0, but input_range is 0.0 .. 100.0"),
     ({"drive": "[5, 5]"}, "both ends are the same"),
+    ({"drive": "[-60000, 20000]", "bits": 8}, "fewer than two codes lie in input_range, 0.0 .. 100.0"),
     ({"bits": 1}, "bits"),
     ({"bits": 25}, "bits"),
     ({"coding": "gray"}, "coding"),
@@ -236,6 +237,26 @@ def test_a_converter_that_misses_a_part_of_the_references_is_told(tmp_path: Path
     hystgen.emit(model(reference="[0, 5]"), tmp_path)
     header = " ".join((tmp_path / "m.h").read_text().replace(" * ", " ").split())
     assert "codes of references reach 0 .. 5 um, and the model's range is 0 .. 1" in header
+
+
+def test_a_reference_in_another_unit_is_told_and_one_without_a_usable_code_refused(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match=r"98\.7 % of the reference's codes, 0 \.\. 1000 um, lie beyond"):
+        hystgen.emit(model(reference="[0, 1000]"), tmp_path)
+    assert "98.7 %" in (tmp_path / "m.h").read_text()
+    with pytest.raises(FormatError, match=r"is 30 \.\. 40 um, all beyond the model's own, 0 \.\. 1"):
+        hystgen.emit(model(reference="[30, 40]"), tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+def test_a_quiet_drive_stands_still_at_the_steps_of_a_coarse_converter(arithmetic: str) -> None:
+    """Creep moves it on, one way; with the band of a finer code it would go to and fro on half of the samples."""
+    text = parameters(bits=12, effects=EFFECTS).replace("emit:\n", "emit:\n  compensation: {quiet: true}\n")
+    codes = np.concatenate([np.linspace(500, 1500, 500), np.full(2500, 1500)]).astype(int)
+    sent = Model(parse_parameters(text)).inverse_codes(codes, arithmetic)
+    moves = np.diff(sent[700:])
+    assert len(set(np.sign(moves[moves != 0]))) <= 1, "reversals at rest"
+    assert np.count_nonzero(moves) <= 25  # the creep left over, code by code
 
 
 def test_files_without_converters_keep_their_hash() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -39,6 +40,16 @@ def test_the_image_tracks_on_every_core(firmware: Path) -> None:
         assert 300 < linear[0] < 500
         assert whole[0] < 0.2 * linear[0]
     assert rows[:3] == rows[3:6] == rows[6:]  # float32, q15 and q31, to a nanometre
+
+
+@pytest.mark.thorough
+def test_another_core_by_the_line_of_the_page(firmware: Path) -> None:
+    """The command of the page, in the copied folder."""
+    page = (EXAMPLE.parent.parent / "docs" / "howto" / "firmware.md").read_text()
+    (line,) = re.findall(r"^make -C examples/firmware (m4f .*)$", page, re.MULTILINE)
+    done = make(firmware, *shlex.split(line))
+    assert done.returncode == 0, done.stdout
+    assert "float32 with -mcpu=cortex-m7" in done.stdout
 
 
 @pytest.mark.thorough

@@ -194,7 +194,9 @@ def test_an_unknown_tool_gets_one_message_and_nothing_is_written(
 ) -> None:
     code, out, said = run("emit", *models, "-o", tmp_path / "fw", "--integration", words)
     assert (code, out, len(said.splitlines())) == (2, "", 1), said
-    assert said.endswith(f"is not one of {', '.join(INTEGRATIONS)}")
+    close = {"cmake,mesom": "meson", "CMake": "cmake", "cmake meson": "cmake or meson"}.get(words)
+    hint = f"; did you mean {close}?" if close else ""
+    assert said.endswith(f"is not one of {', '.join(INTEGRATIONS)}{hint}")
     assert not (tmp_path / "fw").exists()
     with pytest.raises(ValueError, match=r"integration 'mesom' is not one of cmake, meson, "):
         hystgen.emit(models, tmp_path / "fw", integration=("cmake", "mesom"))
@@ -258,7 +260,8 @@ def test_list_outputs_check_and_orphans_cover_packages(
     assert run("emit", *models, "-o", folder, *tools, "--check")[0] == 0
     inside = {path: path.read_bytes() for path in map(Path, everything) if path.parent != folder}
     for change, words in (
-        (lambda good: good.replace(b"hystgen", b"hystGen"), "has no hystgen banner, so something else wrote it"),
+        (lambda good: good.replace(b"hystgen", b"hystGen"),
+         "has no complete hystgen banner: something else wrote it, or the banner was edited"),
         (lambda good: good + b"\n", "was edited by hand"),
         (lambda good: good.replace(b"\n", b"\r\n"), "has line endings other than LF"),
         (None, "is missing"),
@@ -290,7 +293,8 @@ def test_list_outputs_check_and_orphans_cover_packages(
     fewer = (*tools[:-1], "cmake")
     code, _, said = run("emit", *models, "-o", folder, *fewer, "--check")
     assert code == 1
-    assert f"error: {folder}/stage_x/meson.build belongs to model stage_x but is not written with these options" in said
+    left = f"error: {folder}/stage_x/meson.build belongs to model stage_x but is not written with these options"
+    assert f"{left} (add --integration meson)\n" in said
     assert f"{folder}/stage_x/CMakeLists.txt" not in said
     (deletes,) = re.findall(r"^to delete what no model writes: rm (.*)$", said, re.MULTILINE)
     for path in deletes.split():
@@ -611,3 +615,13 @@ def test_espidf_component_is_valid_and_builds(emitted: Path, tmp_path: Path) -> 
         assert (tmp_path / "packed" / f"{name}_0.1.0.tgz").is_file()
     (tmp_path / "components" / "stage_x" / "idf_component.yml").write_text('version: "first"\n')
     done(["compote", "manifest", "lint", "components"], tmp_path, code=1, IDF_TOOLS_PATH=tmp_path)
+
+
+def test_an_option_of_several_words_may_be_given_again(
+    models: list[Path], run: Callable[..., tuple[int, str, str]]
+) -> None:
+    """Of a repeated option, the command line would otherwise silently use only the last."""
+    again = ("--integration", "cmake", "--integration", " meson, zephyr")
+    once = run("emit", models[0], "--list-outputs", "--integration", "cmake,meson,zephyr")
+    assert run("emit", models[0], "--list-outputs", *again) == once
+    assert {"meson.build", "CMakeLists.txt"} <= {Path(line).name for line in once[1].splitlines()}

@@ -19,6 +19,7 @@ CODED = FILES["plain"] + (
     "emit: {converter: {reference: {bits: 12, range: [-9, 9], coding: twos-complement}, "
     "drive: {bits: 12, range: [-5, 5], coding: offset-binary}}}\n"
 )
+ROOT = Path(__file__).parent.parent
 MODELS = {"plain": FILES["plain"], "coded": CODED, "everything": CHAINS["everything"]}
 
 
@@ -63,6 +64,11 @@ def test_a_manifest_says_what_files_and_headers_say(name: str, arithmetic: str, 
         dearest = f"about {small} instructions and {stack} bytes of stack on a Cortex-M0+"
         assert f"{operator} step, costliest: {dearest}" in banner
     assert f"constant tables {figures['tables', '', '']} bytes" in banner
+    for each in found["figures"]:
+        assert bool(each["basis"]) == (each["kind"] == "measured")
+    assert found["command"].endswith(" --manifest")
+    assert f"ziglang>={found['measured_with']['zig']}," in (ROOT / "pyproject.toml").read_text()
+    assert "hystgen_manifest" in schema["required"]
     assert found["licence"] == "0BSD"
     assert len(found["misra"]) > 10
     assert found["effects"] == re.findall(r"name: (\w+)", MODELS[name])[1:]
@@ -78,6 +84,10 @@ def test_a_manifest_is_checked_and_listed_like_the_c(tmp_path: Path) -> None:
     result = run(*command, "--check")
     assert result.exit_code == 1
     assert "plain_manifest.json was edited by hand" in result.output
+    result = run(*command[:-1], "--check")
+    assert "plain_manifest.json belongs to model plain but is not written with these options (add --manifest)" in (
+        result.output
+    )
     path.unlink()
     result = run(*command, "--check")
     assert result.exit_code == 1

@@ -298,7 +298,7 @@ def test_an_inverse_without_a_bound_states_the_error_found() -> None:
     one = of("name: lag, time_constant: 1.0e-3")
     found = float(header(one, "INVERSE_MEASURED_ERROR"))
     assert told(one) == [
-        f"Error: no bound of the inverse's error is known; the largest found in 4800 samples is {found:.2g} V"
+        f"Accuracy: no bound of the inverse's error is known; the largest found in 4800 samples is {found:.2g} V"
     ]
     text = emitted_files(one)["noisy.h"]
     assert "INVERSE_MAX_ERROR" not in text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 import math
@@ -13,7 +12,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.problems import printable
+from hystgen.basics.problems import nearest, printable
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -40,8 +39,7 @@ def known_options(call: str, function: Callable[..., object], given: Iterable[st
     options = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY or each.default is not each.empty]
     for name in given:
         if name not in options:
-            close = difflib.get_close_matches(name, options, 1)
-            hint = f"did you mean {close[0]}?" if close else f"its options are {', '.join(options)}"
+            hint = nearest(name, options) or f"its options are {', '.join(options)}"
             raise TypeError(f"{call}() has no option {printable(name)}; {hint}")
 
 
@@ -94,7 +92,8 @@ def path(name: str, value: object) -> str:
 def choice(name: str, value: object, known: Sequence[str]) -> None:
     """Raise ValueError for a value that is not among the known words."""
     if not (isinstance(value, str) and value in known):
-        raise ValueError(f"{name} {printable(repr(value))} is not one of {', '.join(known)}")
+        hint = nearest(value, known) if isinstance(value, str) else ""
+        raise ValueError(f"{name} {printable(repr(value))} is not one of {', '.join(known)}{hint and f'; {hint}'}")
 
 
 def words(name: str, value: object, example: str) -> tuple[str, ...]:

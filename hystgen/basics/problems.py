@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -46,6 +47,14 @@ class ParameterError(ValueError):
         self.file = file
         self.problems = sorted(problems, key=lambda p: (p.line or 0, p.column or 0))
         super().__init__("\n".join(problem.text(file) for problem in self.problems))
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """`did you mean ..?` with the closest known word, or several equally close ones; empty if none is close."""
+    near = difflib.get_close_matches(word.lower(), known, len(known), 0.6) if len(word) <= 60 and known else []
+    shares = [difflib.SequenceMatcher(None, each, word.lower()).ratio() for each in near]
+    closest = [each for each, share in zip(near, shares, strict=True) if share == shares[0]]
+    return f"did you mean {' or '.join(sorted(closest))}?" if closest else ""
 
 
 def printable(text: str) -> str:

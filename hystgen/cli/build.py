@@ -13,15 +13,19 @@ from hystgen.distribution.platforms import PLATFORMS
 
 @click.command(short_help="Compile the C into shared libraries.")
 @common.params_argument
-@click.option("--target", help=f"comma separated: {', '.join(PLATFORMS)}; default: all")
-@click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
+@click.option(
+    "--target", multiple=True, callback=common.words, metavar="TARGET,..", help=f"{', '.join(PLATFORMS)}; default: all"
+)
+@click.option(
+    "-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to; default: the current one"
+)
 @common.operator_option
 @common.arithmetic_option
 @common.engine_option
 @common.optimize_option
 @common.partial_option
 @common.effects_option
-def build(params: str, target: str | None, output: str, effects: tuple[str, ...], **options: object) -> None:
+def build(params: str, target: tuple[str, ...], output: str, effects: tuple[str, ...], **options: object) -> None:
     """Compile the C of a model into shared libraries for LabVIEW, Python, C# and others, with zig.
 
     Example: hystgen build stage_x.yaml --target x86_64-windows,x86_64-linux -o libraries/
@@ -31,7 +35,7 @@ def build(params: str, target: str | None, output: str, effects: tuple[str, ...]
     """
     from hystgen.distribution import libraries
 
-    targets = tuple(target.split(",")) if target is not None else tuple(PLATFORMS)
+    targets = target or tuple(PLATFORMS)
     model = common.load_model(params, effects)
     write = partial(libraries.build, model, output, targets, progress=True)
     made = common.compiled(params, partial(write, **options))

@@ -121,8 +121,17 @@ def matched(_context: click.Context, _option: click.Parameter, value: tuple[str,
     """The files that match patterns such as 'held/*.csv', sorted by name; all other paths unchanged."""
     found: list[str] = []
     for path in value:
-        found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
+        there = os.path.lexists(path)
+        matching = [path] if there or not glob.has_magic(path) else sorted(glob.glob(path))
+        if not matching:
+            raise Failed(f"error: no file matches {path}; correct the pattern, or the folder it is used in", 2)
+        found += matching
     return tuple(found)
+
+
+def words(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """The words of an option that takes several, separated by commas, given repeatedly, or both."""
+    return tuple(word.strip() for each in value for word in each.split(","))
 
 
 params_argument = click.argument("params", type=click.Path())

@@ -39,10 +39,6 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
     common.guarded(params, run)
 
 
-def _names(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[str, ...]:
-    return () if value is None else tuple(word.strip() for word in value.split(","))
-
-
 @click.command(cls=common.Judging, short_help="Name the effects that a model is missing.")
 @common.params_argument
 @common.data_argument(required=False)
@@ -65,7 +61,7 @@ def _names(_context: click.Context, _option: click.Parameter, value: str | None)
     "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of the whole session"
 )
 @click.option(
-    "--with", "known", metavar="creep,lag", callback=_names,
+    "--with", "known", multiple=True, metavar="creep,lag", callback=common.words,
     help="effects known to be present: always fitted and written, and judged like any other",
 )
 @common.effects_option

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hystgen.basics import console
+from hystgen.basics.problems import counted
 from hystgen.cli import common
 from hystgen.emission.options import INTEGRATIONS
 
@@ -46,7 +47,8 @@ class Emitted:
 @common.optimize_option
 @common.layout_option
 @click.option(
-    "--integration", metavar="TOOL,..", help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS)
+    "--integration", multiple=True, callback=common.words, metavar="TOOL,..",
+    help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS),
 )
 @click.option(
     "--check", is_flag=True, help="write nothing; exit 1 and list the files that differ or that none of PARAMS writes"
@@ -59,7 +61,7 @@ class Emitted:
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
-    list_outputs: bool, quiet: bool, integration: str | None, **options: object,
+    list_outputs: bool, quiet: bool, integration: tuple[str, ...], **options: object,
 ) -> None:
     """Write the C files of models.
 
@@ -75,19 +77,21 @@ def emit(
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
+    if check and list_outputs:
+        raise common.Failed("error: --check compares files and --list-outputs only names them; give one of the two", 2)
     if junit_file:
         if not check:
             raise common.Failed("error: --junit reports what --check finds; add --check", 2)
         common.keep_inputs([junit_file], params)
         common.guarded(junit_file, partial(writing.check_writable, junit_file))
-    tools = options["integration"] = tuple(integration.split(",")) if integration is not None else ()
-    for tool in tools:
+    options["integration"] = integration
+    for tool in integration:
         common.guarded(output or ".", partial(arguments.choice, "integration", tool, INTEGRATIONS))
     models = common.for_each(params, partial(common.load_model, effects=effects))
     folders = [_folder(path, model, output) for path, model in zip(params, models, strict=True)]
     for folder in dict.fromkeys(folders):
-        together = [model for model, own in zip(models, folders, strict=True) if own == folder]
-        common.guarded(str(folder), partial(calls.check_names, together))
+        together = {path: model for path, model, own in zip(params, models, folders, strict=True) if own == folder}
+        common.guarded(str(folder), partial(calls.check_names, list(together.values()), list(together)))
 
     def emitted(one: tuple[str, Model, Path]) -> Emitted:
         path, model, folder = one
@@ -98,6 +102,9 @@ def emit(
     made = common.for_each(list(zip(params, models, folders, strict=True)), emitted)
     if check:
         _check(made, output, options, effects, junit_file)
+        if not quiet:
+            files, sources = sum(len(one.files) for one in made), counted(len(made), "model")
+            console.note(f"up to date: {counted(files, 'file')} of {sources}")
         return
 
     def written(folder: Path) -> list[Path]:
@@ -141,7 +148,11 @@ def _check(
     for folder in dict.fromkeys(one.folder for one in made):
         own = [one for one in made if one.folder == folder]
         written = {name for one in own for name in one.files}
-        left = common.guarded(str(folder), partial(stale.orphans, folder, written, [one.model.name for one in own]))
+        here = [one.model.name for one in own]
+        elsewhere = {
+            one.model.name: f"to {one.folder}{os.sep}: see emit.output in {one.parameters}" for one in made
+        }
+        left = common.guarded(str(folder), partial(stale.orphans, folder, written, here, elsewhere))
         unwritten += left
         suites += [stale.orphan_suite(folder, left)] if left else []
     if junit_file:

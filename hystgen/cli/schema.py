@@ -10,7 +10,7 @@ from hystgen.basics import console
 @click.command()
 @click.option("--manifest", is_flag=True, help="that of NAME_manifest.json, which emit --manifest writes")
 def schema(manifest: bool) -> None:
-    """Print the JSON Schema of the parameter file.
+    """Print the JSON Schema of the parameter file, or of the manifest.
 
     Editors use it if the file begins with  # yaml-language-server: $schema=hystgen.schema.json
 

@@ -28,14 +28,17 @@ if TYPE_CHECKING:
 @common.partial_option
 @common.effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
-@click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
+@click.option(
+    "--targets", multiple=True, callback=common.words, default=["host"], metavar="TARGET,..",
+    help=f"{', '.join(TARGETS)}; default: host",
+)
 @click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report as JSON")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 @common.quiet_option
 def verify(
-    params: tuple[str, ...], compiler: tuple[str, ...], targets: str, target_length: int | None, json_file: str | None,
-    junit_file: str | None, quiet: bool, effects: tuple[str, ...], **options: object,
+    params: tuple[str, ...], compiler: tuple[str, ...], targets: tuple[str, ...], target_length: int | None,
+    json_file: str | None, junit_file: str | None, quiet: bool, effects: tuple[str, ...], **options: object,
 ) -> None:
     """Compile the emitted C of models, run it and compare it with the Python reference, bit for bit.
 
@@ -46,15 +49,13 @@ def verify(
     The exit code is 1 if bits differ or C cannot be built, and 2 if the only problem is a missing tool.
     """
     from hystgen import verification
-    from hystgen.basics import jit, writing
+    from hystgen.basics import arguments, jit, writing
 
     if quiet:
         jit.announce = None
 
-    chosen = tuple(targets.split(","))
-    for word in chosen:
-        if word not in TARGETS:
-            raise common.Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
+    for word in targets:
+        common.guarded("--targets", partial(arguments.choice, "target", word, TARGETS))
     params = tuple(dict.fromkeys(params))
     common.keep_inputs((json_file, junit_file), params)
     for file in (json_file, junit_file):
@@ -72,7 +73,7 @@ def verify(
                 console.note(f"verifying: {about}{what}")
 
         check = partial(
-            verification.verify, model, compiler=compiler, targets=chosen, target_length=target_length, progress=say
+            verification.verify, model, compiler=compiler, targets=targets, target_length=target_length, progress=say
         )
         return replace(common.guarded(path, partial(check, **options)), file=path)
 

@@ -61,9 +61,11 @@ def fmu(
     path = Path(arguments.path("output", output))
     arguments.whole("fmi", fmi, "major versions", 0)
     arguments.choice("fmi", str(fmi), [str(each) for each in VERSIONS])
+    if path.suffix != ".fmu":
+        raise ValueError(f"output {path} does not end in .fmu, by which importers know a unit; write {path.name}.fmu")
     model = as_model(source)
     if not model.parameters.sample_time:
-        words = "missing, and a co-simulation unit needs it as its step size; add `sample_time: 1.0e-4`, in s"
+        words = f"missing, and a co-simulation unit needs it as its step size; add {model.sample_time_advice}, in s"
         raise FormatError((("sample_time",), words))
     operator, arithmetic = operator or model.parameters.emit.operator, arithmetic or model.parameters.emit.arithmetic
     if operator == "both":

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hystgen.basics.problems import printable
-
 
 @dataclass(frozen=True)
 class Platform:
@@ -56,6 +54,7 @@ PLATFORMS = {
 
 def find(name: str) -> Platform:
     """The platform of that name. Raises ValueError."""
-    if name not in PLATFORMS:
-        raise ValueError(f"unknown target {printable(repr(name))}; use {', '.join(PLATFORMS)}")
+    from hystgen.basics import arguments
+
+    arguments.choice("target", name, tuple(PLATFORMS))
     return PLATFORMS[name]

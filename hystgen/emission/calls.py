@@ -147,12 +147,16 @@ def _swing(model: Model) -> float:
     return swing(model.cascade, Parts.of(model.effects), seconds) if seconds else 0.0
 
 
-def check_names(models: Sequence[Model]) -> None:
-    """Raise ValueError if two models make files with the same name."""
+def check_names(models: Sequence[Model], parameters: Sequence[str] = ()) -> None:
+    """Raise ValueError if two models make files with the same name; `parameters`: their files, for the message."""
     names = [model.name.lower() for model in models]  # macros and some file systems ignore case
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ValueError(f"two models are called {twice[0]}, so their files would overwrite each other; rename one")
+        files = ", ".join(file for name, file in zip(names, parameters, strict=False) if name == twice[0])
+        raise ValueError(
+            f"two models are called {twice[0]}{files and f' ({files})'}, so their files would overwrite each other; "
+            "rename one"
+        )
 
 
 @arguments.taking(emit_options, "emit")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.problems import FormatError
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
 from hystgen.compensator.converter import CodeLine
@@ -77,7 +78,7 @@ def unbounded(one: EmittedModel) -> list[str]:
         return []
     unit = one.form.unit(one.units.drive)
     said = (
-        f"Error: no bound of the inverse's error is known; the largest found in {found.samples} samples is "
+        f"Accuracy: no bound of the inverse's error is known; the largest found in {found.samples} samples is "
         f"{found.error:.2g}{unit}"
     )
     rounding = float(one.numbers.errors.rounding)
@@ -94,19 +95,52 @@ def reading(one: EmittedModel) -> list[str]:
     return [*_converted(one), *_averaged(compiled), *_branches(compiled, one.model.parameters), *_quiet(one, compiled)]
 
 
-def _converted(one: EmittedModel) -> list[str]:
-    """A sentence if the codes of the reference's converter do not reach the whole range of references, as is usual:
-    few stages are used over every displacement that some history of drives leads to."""
+class _Reach(NamedTuple):
+    """The range of a reference's codes and that of the model in words; the share of the codes inside the latter, and
+    whether they cover it."""
+
+    codes: str
+    model: str
+    inside: float
+    whole: bool
+
+
+def _reach(one: EmittedModel) -> _Reach | None:
     both, unit = one.model.parameters.emit.converter, one.units.output
     if one.conversion is None or both is None:
-        return []
+        return None
     lsb = float(one.numbers.lsb[1]) if one.numbers.lsb else 1.0
     low, high = (lsb * float(end) for end in one.numbers.tables.limits.output[0])
     least, most = sorted(both.reference.range)
-    if least <= low and high <= most:
+    codes, model = (f"{a:.5g} .. {b:.5g} {unit}".rstrip() for a, b in ((least, most), (low, high)))
+    return _Reach(codes, model, (min(high, most) - max(low, least)) / (most - least), least <= low and high <= most)
+
+
+def misread(one: EmittedModel) -> list[str]:
+    """A sentence if most codes of the reference's converter lie beyond the model's range, as with another unit.
+
+    Raises FormatError if all of them do.
+    """
+    reach = _reach(one)
+    if reach is None or reach.inside >= 0.5:  # most codes are of use
         return []
-    reached, needed = (f"{a:.5g} .. {b:.5g} {unit}".rstrip() for a, b in ((least, most), (low, high)))
-    return [f"Converter: codes of references reach {reached}, and the model's range is {needed}"]
+    if reach.inside <= 0.0:
+        words = f"is {reach.codes}, all beyond the model's own, {reach.model}; give it in the unit of the output"
+        raise FormatError((("emit", "converter", "reference", "range"), words))
+    return [
+        f"Converter: {100.0 - 100.0 * reach.inside:.3g} % of the reference's codes, {reach.codes}, lie beyond the "
+        f"model's range, {reach.model}, and are limited to it; emit.converter.reference.range is in the unit of the "
+        "output"
+    ]
+
+
+def _converted(one: EmittedModel) -> list[str]:
+    """A sentence if the codes of the reference's converter do not reach the whole range of references, as is usual:
+    few stages are used over every displacement that some history of drives leads to."""
+    reach = _reach(one)
+    if reach is None or reach.whole or misread(one):
+        return []
+    return [f"Converter: codes of references reach {reach.codes}, and the model's range is {reach.model}"]
 
 
 def _averaged(compiled: Compiled) -> list[str]:

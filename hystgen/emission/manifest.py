@@ -27,6 +27,12 @@ class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+SIMILAR = "for a model with the same parts and the same number of plays, interpolated between measured ones"
+SIMILAR_CODE = "for a model with the same parts and 10 plays"
+MEASURED_WITH = {"zig": "0.17", "arm-none-eabi-gcc": "12.2"}
+"""Compilers, at -O2, behind `hystgen/compensator/*_costs.csv` and `*_sizes.csv`; the larger figure counts."""
+
+
 class File(_Entry):
     """An emitted file."""
 
@@ -47,8 +53,8 @@ class Bound(_Entry):
 
 
 class Figure(_Entry):
-    """Bytes or instructions: `proved` from the declarations in the C, or `measured` on emulated cores with models of
-    the same parts, whose compilers, flags and records benchmarks/step_costs.py states."""
+    """Bytes or instructions: `proved` from the declarations in the C, or `measured` on emulated cores with similar
+    models; `hystgen verify --targets` measures the model itself."""
 
     what: Literal["flash", "tables", "ram", "instructions", "stack"]
     value: int
@@ -56,6 +62,7 @@ class Figure(_Entry):
     kind: Literal["proved", "measured"]
     operator: str = Field(default="", description="empty for all operators together")
     core: str = Field(default="", description="empty for every 32-bit core")
+    basis: str = Field(default="", description="the models that were measured; empty for a proved figure")
 
 
 class AllowedDeviation(_Entry):
@@ -69,16 +76,16 @@ class Manifest(_Entry):
     """What a safety file says about the emitted C of a model."""
 
     about: tuple[str, ...] = Field(description="origin and hash of this file, as in the banner of every emitted file")
-    hystgen_manifest: Literal[1] = 1
+    hystgen_manifest: Literal[1] = Field(description="format version")
     model: str = Field(description="prefix of every symbol")
     description: str
     generator: str = Field(description="version of hystgen")
-    command: str
+    command: str = Field(description="writes the C and this file again")
     options: Mapping[str, str]
     parameters_sha256: str = _HASH
     effects: tuple[str, ...] = Field(description="effects in the C, in the order of the parameter file")
     not_compensated: tuple[str, ...] = Field(description="a sentence for each effect that the C leaves out")
-    files: tuple[File, ...] = Field(description="every emitted file but this one")
+    files: tuple[File, ...] = Field(description="files of the C, of which packages for build tools hold copies")
     sample_time: float | None = Field(description="s between steps; null without effects")
     drive_range: tuple[float, float] = Field(description="drives that a step can return or take, in units of the drive")
     output_range: tuple[float, float] = Field(description="references or outputs, in units of the output")
@@ -87,6 +94,7 @@ class Manifest(_Entry):
     doubts: tuple[str, ...] = Field(description="why the inverse may be of little use, one sentence each")
     operations: Mapping[str, str] = Field(description="most operations of a step by operator; proved")
     figures: tuple[Figure, ...]
+    measured_with: Mapping[str, str] = Field(description="compilers of the measured figures, at -O2, with versions")
     licence: str = Field(description="SPDX identifier of the emitted files")
     misra: tuple[AllowedDeviation, ...] = Field(description="deviations from MISRA C:2012")
 
@@ -113,7 +121,7 @@ def file(module: Module, files: Mapping[str, str]) -> dict[str, str]:
     """The manifest's name and text for a module with these emitted files."""
     one = module.compensator
     parameters, units = one.model.parameters, one.units
-    command = interface.command(parameters, one.options)
+    command = f"{interface.command(parameters, one.options)} --manifest"
     ends, lsb = one.numbers.tables.limits, [float(each) for each in one.numbers.lsb] or [1.0, 1.0]
     made = Manifest(
         about=(
@@ -121,6 +129,7 @@ def file(module: Module, files: Mapping[str, str]) -> dict[str, str]:
             f"Parameters: sha256 {module.sha256}",
             "The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.",
         ),
+        hystgen_manifest=1,
         model=one.names.name,
         description=parameters.description,
         generator=__version__,
@@ -148,6 +157,7 @@ def file(module: Module, files: Mapping[str, str]) -> dict[str, str]:
         doubts=tuple(module.doubts),
         operations=dict(module.cost.worst_case),
         figures=tuple(_figures(module)),
+        measured_with=MEASURED_WITH,
         licence="0BSD",
         misra=tuple(AllowedDeviation(rule=rule, reason=reason) for rule, reason in deviations()["misra"].items()),
     )
@@ -162,14 +172,16 @@ def _figures(module: Module) -> list[Figure]:
         Figure(what="ram", value=size, unit="bytes", kind="proved", operator=op) for op, size in cost.memory.instances
     ]
     for core in engines.CORES:
-        found.append(Figure(what="flash", value=cost.code[core], unit="bytes", kind="measured", core=core))
+        found.append(
+            Figure(what="flash", value=cost.code[core], unit="bytes", kind="measured", core=core, basis=SIMILAR_CODE)
+        )
         for op, cores in cost.dearest.items():
             dearest = cores[core]
             figures: Sequence[tuple[Literal["instructions", "stack"], int, Literal["instructions", "bytes"]]] = (
                 ("instructions", dearest.instructions, "instructions"), ("stack", dearest.stack, "bytes"),
             )
             found += [
-                Figure(what=what, value=value, unit=unit, kind="measured", operator=op, core=core)
+                Figure(what=what, value=value, unit=unit, kind="measured", operator=op, core=core, basis=SIMILAR)
                 for what, value, unit in figures
             ]
     return found

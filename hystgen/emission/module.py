@@ -227,7 +227,7 @@ def of(model: Model, options: Options, sha256: str = "") -> Module:
     return Module(
         one, made, cost.estimate(model.cascade, options, one.numbers.tables, made.data),
         sha256 or parameters_sha256(model.parameters), interface.reading(one),
-        [*dynamic, *interface.unbounded(one)],
+        [*dynamic, *interface.unbounded(one), *interface.misread(one)],
     )
 
 

@@ -6,8 +6,8 @@ structure.
 
 from __future__ import annotations
 
-import difflib
 import itertools
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, get_args
@@ -16,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 
 from hystgen import effects
 from hystgen.basics.names import name_problem
-from hystgen.basics.problems import Path, Problem, path_text, printable, shown
+from hystgen.basics.problems import Path, Problem, nearest, path_text, printable, shown
 from hystgen.basics.quantities import MAX_NUMBER
 from hystgen.parameters import schema
 from hystgen.parameters.yaml import Document
@@ -208,7 +208,7 @@ class _Checker:
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
             place = next((place for place, part in _PLACES.items() if key in part.model_fields), None)
-            advice = f"it belongs {place}" if place else _nearest(key, known)
+            advice = f"it belongs {place}" if place else nearest(key, known)
             self.add(path, f"unknown key; {advice or 'valid here: ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
@@ -291,6 +291,14 @@ class _Checker:
                 f"reaches {shown(low)} .. {shown(high)}, but input_range is {shown(needed[0])} .. {shown(needed[1])}; "
                 "correct the range, or narrow input_range to what the converter reaches",
             )
+        elif needed is not None and (bits := self.get(*path, "bits")) is not None:
+            step = (high - low) / (2**bits - 1)
+            if math.floor((needed[1] - low) / step) <= math.ceil((needed[0] - low) / step):
+                self.add(
+                    (*path, "range"),
+                    f"makes steps of {step:.4g}, so fewer than two codes lie in input_range, {shown(needed[0])} .. "
+                    f"{shown(needed[1])}; correct the range, which is in input units, or give more bits",
+                )
 
     def _text(self, path: Path, lines: bool) -> None:
         text = self.get(*path) or ""
@@ -455,7 +463,7 @@ class _Checker:
             self.add(name, f"{printable(given)} is not defined in any given file{there}; give its file (--effects)")
         else:
             names = (*EFFECT_NAMES, *self.user)
-            advice = _nearest(given, names) or f"known effects: {', '.join(names)}"
+            advice = nearest(given, names) or f"known effects: {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
 
     def _shaped(self, path: Path, effect: Mapping[str, object], shapes: Shapes) -> None:
@@ -512,19 +520,11 @@ def _entries(count: int) -> str:
     return "1 value" if count == 1 else f"{count} values"
 
 
-def _nearest(word: str, known: Sequence[str]) -> str:
-    """`did you mean ..?` with the closest known word, or several equally close ones; empty if none is close."""
-    near = difflib.get_close_matches(word.lower(), known, len(known), 0.6) if len(word) <= 60 and known else []
-    shares = [difflib.SequenceMatcher(None, each, word.lower()).ratio() for each in near]
-    nearest = [each for each, share in zip(near, shares, strict=True) if share == shares[0]]
-    return f"did you mean {' or '.join(sorted(nearest))}?" if nearest else ""
-
-
 def _choice(value: object, known: Sequence[object]) -> str:
     """Message for an unknown value."""
     listed = ", ".join(str(choice) for choice in known[:-1]) + (" or " if len(known) > 1 else "") + str(known[-1])
     words = [choice for choice in known if isinstance(choice, str)]
-    near = _nearest(value, words) if isinstance(value, str) and words else ""
+    near = nearest(value, words) if isinstance(value, str) and words else ""
     return f"must be {listed}, not {shown(value)}; {near or 'choose one of them'}"
 
 

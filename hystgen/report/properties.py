@@ -9,6 +9,7 @@ from hystgen.arithmetic import ARITHMETICS, FIXED, FLOATING
 from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
+from hystgen.compensator.converter import CodeLine
 from hystgen.emission import interface, module
 from hystgen.emission.calls import emit_options
 from hystgen.front.dead_zone.model import DeadZone
@@ -54,6 +55,9 @@ def properties(model: Model, within: float = SETTLED) -> str:
             f"{_most(history)}{output}"
         )
     lines.append(f"settling           {settling(model, within)}")
+    if both := p.emit.converter:
+        read, made = (float(abs(CodeLine.of(one).step)) for one in (both.reference, both.drive))
+        lines.append(f"converters         {read:.4g}{output} per code of the reference, {made:.4g}{drive} of the drive")
     problems = c.inverse_problems()
     if model.effects:
         said = "effects            the lines above, except settling, are for the model without them"

@@ -99,4 +99,7 @@ def find(name: str) -> Target:
     for target in TARGETS:
         if target.name == name:
             return target
-    raise ValueError(f"unknown target {name!r}; use {', '.join(NAMES)}")
+    from hystgen.basics import arguments
+
+    arguments.choice("target", name, NAMES)
+    raise ValueError(f"target {name!r} is not an emulated core")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hystgen import effects
-from hystgen.basics.problems import printable
+from hystgen.basics.problems import nearest, printable
 from hystgen.diagnosis.search import acceptance, fits, ranges, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Option, Records, Tried
@@ -27,8 +26,8 @@ def check(names: Sequence[str], user: Sequence[type[Effect]], there: Collection[
     known = [*effects.CATALOGUE, effects.BEND, *dict.fromkeys(map(screening.name_of, user))]
     strange = [name for name in names if name not in known]
     if strange:
-        close = difflib.get_close_matches(strange[0], known, 1)
-        hint = f" (did you mean {close[0]}?)" if close else ""
+        close = nearest(strange[0], known)
+        hint = close and f" ({close})"
         said = ", ".join(f'"{printable(name)}"' for name in strange)
         raise ValueError(f"there is no effect {said}{hint}; the effects are {', '.join(known)}")
     if doubled := [name for name in names if names.count(name) > 1]:
