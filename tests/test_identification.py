@@ -695,7 +695,7 @@ class TestRefused:
                 -SINE,
                 (),
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
-                "the sign of y, otherwise check which column is which",
+                "the sign of y (--columns y=-y), otherwise check which column is which",
             ),
             (
                 SINE, SINE, ("--skip", "0.39"),

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import click
+from click.core import ParameterSource
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
@@ -252,6 +253,21 @@ def joined(pairs: tuple[tuple[str, str], ...]) -> list[str]:
         if not os.path.exists(records.files(path)[0]):
             raise Failed(f"error: --join {path}: there is no such file; give the files of two channels", 2)
     return [records.MARK.join(pair) for pair in pairs]
+
+
+AGAIN = ("columns", "sample_time", "delimiter", "history", "rest", "skip", "clock_skew")
+"""Options about records that the next command with the same records has to repeat."""
+
+
+def repeated() -> dict[str, str]:
+    """The options of the running command that say how its records are read and compared, as the user gave them."""
+    context = click.get_current_context()
+    given = {
+        option.opts[0]: context.params[option.name]
+        for option in context.command.params
+        if option.name in AGAIN and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+    }
+    return {option: str(value) for option, value in given.items()}
 
 
 class ReadingArguments(TypedDict):

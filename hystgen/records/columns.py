@@ -450,7 +450,8 @@ class Finder:
                     missing.append(ours)
             # Names come first; meaning only decides among the remaining columns
             for ours in missing:
-                chosen = None if ours in self.mapping else self._meant(ours, found, self._folders(found, need))
+                theirs = self.mapping.get(ours, ours)  # v=y takes a column called Position too
+                chosen = self._meant(theirs, found, self._folders(found, need)) if theirs in (ours, *STANDARD) else None
                 if chosen is not None:
                     found[ours] = self.understood[ours] = chosen
                     continue

@@ -102,7 +102,8 @@ class Reading:
     the file does not state plainly; `channel`: whether the file holds one channel of a record in several files;
     `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
     unpacked; `part`: the table, sheet or member that the user names behind the file; `origin`: nanoseconds since year 1
-    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it.
+    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it;
+    `negated`: our names of the columns whose sign is to be changed, `y=-Position`.
     """
 
     file: str
@@ -122,9 +123,12 @@ class Reading:
     part: str = ""
     origin: int | None = None
     start: str = ""
+    negated: Set[str] = frozenset()
 
     def __post_init__(self) -> None:
         self.name, self.path = self.name or Path(self.file).name, self.path or self.file
+        self.negated = {ours for ours, theirs in self.columns.items() if theirs[:1] == "-" != theirs}
+        self.columns = {ours: theirs[ours in self.negated :] for ours, theirs in self.columns.items()}
         if self.delimiter in ("\\t", "tab"):
             self.delimiter = "\t"
 
@@ -315,6 +319,9 @@ class Reading:
                 several, s = ("numbers such as ", "") if len(written) > 1 else ("", "s")
                 self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as no value"
             x[wrong] = np.nan
+            if name in self.negated:
+                np.negative(x, out=x)
+                self.understood(f"{name} = {printable(taken[name].own)} with its sign changed")
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
             raise self.refuse(
