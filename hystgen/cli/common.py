@@ -112,6 +112,19 @@ def load_model(path: str, effects: Sequence[str] = ()) -> Model:
     return guarded(path, lambda: load(path, effects))
 
 
+class Seconds(click.ParamType[float]):
+    """A number of seconds."""
+
+    name = "seconds"
+
+    def convert(self, value: str | float, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number; a failure if it is none, as with a unit behind it."""
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"'{value}' is not a number; give seconds, without a unit, as in 0.005", param, ctx)
+
+
 def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
     if not 0 <= value < math.inf:
         raise click.BadParameter("give seconds, 0 or more")
@@ -149,7 +162,7 @@ layout_option = click.option(
     show_default=True,
 )
 skip_option = click.option(
-    "--skip", type=float, callback=seconds, default=0.0,
+    "--skip", type=Seconds(), callback=seconds, default=0.0,
     help="seconds at the start of every record to leave out of the comparison; their drive still counts",
 )
 def _skew(_context: click.Context, _option: click.Parameter, value: str | None) -> float | str | None:
@@ -302,7 +315,7 @@ _RECORD_OPTIONS = [
         help="names t, v, y for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
         "number, 1,2,3 for t, v, y",
     ),
-    click.option("--sample-time", type=float, help="sample time in seconds, for files without time"),
+    click.option("--sample-time", type=Seconds(), help="sample time in seconds, for files without time"),
     click.option("--delimiter", help="default: detected from the file"),
     click.option(
         "--join", nargs=2, multiple=True, type=click.Path(), metavar="DRIVE MEASURED",
@@ -310,7 +323,7 @@ _RECORD_OPTIONS = [
     ),
     click.option("--history", metavar="V,V,..", help="drive values visited before each record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
+        "--rest", type=Seconds(), callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
     ),
 ]
 

@@ -294,9 +294,12 @@ def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Cours
     settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
         if item.used < SHORTEST:
+            longer = len(item.v) >= 2 * SHORTEST
             raise IdentificationError(
-                f"{item.name} is held out, but only {item.used} of its samples can be compared, and at least "
-                f"{SHORTEST} are needed; hold out a longer record"
+                f"{item.name} is held out, but only {item.used} of its {len(item.v)} samples can be compared, and at "
+                f"least {SHORTEST} are needed; "
+                + ("the others depend on moves before the record: begin it with a sweep over the drive's range, or give "
+                   "--history" if longer else "hold out a longer record")
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, ErrorRow.of("held out", "written", errors))

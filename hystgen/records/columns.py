@@ -299,7 +299,7 @@ STANDARD = ("t", "v", "y")
 MEANINGS = {
     "t": frozenset(("t", "time", "times", "timestamp", "zeit", "temps", "tiempo")),
     "v": frozenset(
-        ("v", "u", "voltage", "volt", "volts", "drive", "input", "spannung", "voltaje", "antrieb", "ansteuerung")
+        ("v", "u", "hv", "voltage", "volt", "volts", "drive", "input", "spannung", "voltaje", "antrieb", "ansteuerung")
     ),
     "y": frozenset(
         ("y", "displacement", "disp", "position", "pos", "output", "deflection", "elongation", "stroke", "weg",
@@ -450,9 +450,11 @@ class Finder:
                     missing.append(ours)
             # Names come first; meaning only decides among the remaining columns
             for ours in missing:
-                theirs = self.mapping.get(ours, ours)  # v=y takes a column called Position too
+                theirs, unit = split_unit(self.mapping[ours]) if ours in self.mapping else (ours, "")
+                # v=y takes a column called Position too, t=t [ms] one called Time
                 chosen = self._meant(theirs, found, self._folders(found, need)) if theirs in (ours, *STANDARD) else None
-                if chosen is not None:
+                if chosen is not None and (not unit or not chosen.unit):
+                    chosen.unit = chosen.unit or unit
                     found[ours] = self.understood[ours] = chosen
                     continue
                 if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
