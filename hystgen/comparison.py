@@ -59,8 +59,8 @@ class CostOfC:
 class Deviation:
     """A model's deviations from the records: measured minus model (N,) per record, NaN where not compared.
 
-    `effects`: names of its effects; `cost`: of its C, None for the straight line and where `emit` refuses the model, for
-    the reason in `refused`.
+    `effects`: names of its effects; `cost`: of its C, None for the straight line and where `emit` refuses the model;
+    `refused`: why it does.
     """
 
     name: str

@@ -288,18 +288,23 @@ def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: gpi.
     return _compared(fitted, compared, begun)
 
 
+LONGER = "hold out a longer record"
+
+SWEPT = (
+    "the others depend on moves before the record: begin it with a sweep over the drive's range, or give --history"
+)
+"""Advice for a held-out record with too few samples, and for one of which too few can be compared."""
+
+
 def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Course]) -> _Tried:
     """A fit with its errors on held-out courses."""
     largest = float(fitted.solution.thresholds[-1])
     settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
         if item.used < SHORTEST:
-            longer = len(item.v) >= 2 * SHORTEST
             raise IdentificationError(
                 f"{item.name} is held out, but only {item.used} of its {len(item.v)} samples can be compared, and at "
-                f"least {SHORTEST} are needed; "
-                + ("the others depend on moves before the record: begin it with a sweep over the drive's range, or give "
-                   "--history" if longer else "hold out a longer record")
+                f"least {SHORTEST} are needed; {LONGER if len(item.v) < 2 * SHORTEST else SWEPT}"
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, ErrorRow.of("held out", "written", errors))

@@ -543,7 +543,8 @@ class Finder:
             times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
             others = iter([c for c in free if c not in times])
             answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
-            if None not in answers.values() and next(others, None) is None:
+            left = next(others, None)
+            if None not in answers.values() and (left is None or unnamed == ["u"]):  # of several axes, the first
                 said = ",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)
                 return f', for example --columns "{said}"'
         return ""

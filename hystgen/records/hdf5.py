@@ -13,9 +13,9 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.problems import printable
 from hystgen.records import mat_objects
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
-from hystgen.basics.problems import printable
 from hystgen.records.columns import Column, Step, from_number, is_named
 from hystgen.records.reading import MASKING, Matrix, Reading, Table, in_matrix, one_dimension, without_masked
 
@@ -77,10 +77,11 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 of = f"{folder}{name}" if isinstance(found, h5py.Dataset) else f"{folder}{name}/"
                 steps.extend(_attributes(found, of))
             if not isinstance(found, h5py.Dataset):
-                if isinstance(found, h5py.Group) and np.bytes_(found.attrs.get("pandas_type", b"")).startswith(b"frame"):
+                kind = found.attrs.get("pandas_type", b"") if isinstance(found, h5py.Group) else b""
+                if np.bytes_(kind).startswith(b"frame"):
                     raise reading.refuse(
                         f"{printable(path)} is a data frame in pandas' own layout; save it as Parquet, in Python: "
-                        f'pandas.read_hdf("{printable(reading.file)}", "{printable(path)}").to_parquet("frame.parquet")'
+                        f"pandas.read_hdf({reading.file!r}, {path!r}).to_parquet('frame.parquet')"
                     )
                 columns.extend(_list_of_structs(reading, file, found, f"{folder}{name}.") if matlab else ())
                 return

@@ -12,7 +12,6 @@ from typing import IO, TYPE_CHECKING, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import printable
 from hystgen.records.columns import Column
 from hystgen.records.reading import Reading, Table, unlogged
 
@@ -44,7 +43,7 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         groups = cast("list[_Group]", file.groups)  # of one of two classes, by the version
         many = _apart(file, groups)
         reading.same_length = (
-            f'resample them in Python, asammdf.MDF("{printable(reading.file)}").resample(SECONDS).save("resampled.mf4")'
+            f'resample them in Python, asammdf.MDF({reading.file!r}).resample(SECONDS).save("resampled.mf4")'
         )
         for number, group in enumerate(groups):
             folder = f"{number}/" if many else ""

@@ -103,8 +103,8 @@ class Reading:
     `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
     unpacked; `part`: the table, sheet or member that the user names behind the file; `origin`: nanoseconds since year 1
     of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it;
-    `negated`: our names of the columns whose sign is to be changed, `y=-Position`; `same_length`: advice about columns of
-    different lengths.
+    `negated`: our names of the columns whose sign is to be changed, `y=-Position`; `same_length`: advice about columns
+    of different lengths.
     """
 
     file: str
@@ -504,7 +504,7 @@ def _cut(columns: dict[str, Array], needed: Set[str]) -> None:
 
 EXPORT_WHOLE = "export every column at one sample rate, with a number in each row"
 
-SPLIT = "if the time starts again there, give each run a file of its own"
+SPLIT = "correct the time there, or, if it starts again, give each run a file of its own"
 
 
 def _drop(
