@@ -552,3 +552,10 @@ def test_a_part_of_an_archive_is_proposed_among_the_most_frequent_kind(tmp_path:
     (tmp_path / "a.zip").write_bytes(made.zipped({"1.csv": text, "2.csv": text, "notes.txt": b"hello"}))
     with pytest.raises(RecordError, match=r"as in .*a\.zip/2\.csv$"):
         read_record(tmp_path / "a.zip")
+
+
+def test_a_sample_time_does_not_hide_that_joined_files_start_apart(tmp_path: Path) -> None:
+    for name, x, start in (("v.csv", V, 0.0), ("y.csv", Y, 0.5), ("same.csv", Y, 0.0)):
+        (tmp_path / name).write_text(made.channel(x, start=start))
+    assert "start at different times" in refused(f"{tmp_path / 'v.csv'}+{tmp_path / 'y.csv'}", sample_time=STEP)
+    check(read_record(f"{tmp_path / 'v.csv'}+{tmp_path / 'same.csv'}", sample_time=STEP))
