@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -55,13 +56,15 @@ class CostOfC:
 class Deviation:
     """A model's deviations from the records: measured minus model (N,) per record, NaN where not compared.
 
-    `effects`: names of its effects; `cost`: of its C, None for the straight line and where `emit` refuses the model.
+    `effects`: names of its effects; `cost`: of its C, None for the straight line and where `emit` refuses the model;
+    `refused`: why it does.
     """
 
     name: str
     effects: tuple[str, ...]
     errors: tuple[Array, ...] = field(repr=False, compare=False)
     cost: CostOfC | None = None
+    refused: str = ""
 
     @property
     def rms(self) -> float:
@@ -141,6 +144,7 @@ class Comparison(Presented):
         if len(rows[0]) > PLAIN:
             cost = "instructions of the most expensive sample; bytes of flash and of RAM"
             below.append(f"C, estimated for a {CORE}: {cost}.")
+        below += [f"{each.name} has no C yet: {each.refused}." for each in self.models if each.refused]
         return "\n".join([*lines, *below, self.sentence()])
 
     @property
@@ -188,6 +192,15 @@ class Comparison(Presented):
         elif tied and noise:
             said.append("They leave no more than noise")
         return " ".join(f"{each}." for each in said)
+
+    def next_step(self) -> tuple[str, str]:
+        """What to do with the closest model, and its command; empty if no model is closer than a straight line."""
+        best = self.models[0]
+        if not best.rms < self.line.rms:
+            return "", ""
+        file = shlex.quote(best.name if best.name.endswith((".yaml", ".yml")) else "params.yaml")
+        first = f"once {best.name} has what its C needs (see above), " if best.refused else ""
+        return f"{first}write the compensator as C", f"hystgen emit {file} -o firmware/"
 
     def content(self) -> dict[str, object]:
         """The comparison as plain data for JSON."""
@@ -356,21 +369,21 @@ def _deviation(name: str, model: Model, items: Sequence[Item], factor: float) ->
     except NotFiniteError:
         raise EffectsError(f"{name}: an effect gives no finite output on these records") from None
     names = tuple(dict.fromkeys(effect.name for effect in model.effects))
-    return Deviation(name, names, errors, _cost(model))
+    return Deviation(name, names, errors, *_cost(model))
 
 
-def _cost(model: Model) -> CostOfC | None:
-    """Cost of the C that `emit` would write; None if it refuses the model."""
+def _cost(model: Model) -> tuple[CostOfC | None, str]:
+    """Cost of the C that `emit` would write; None with the reason if it refuses the model."""
     from hystgen.emission import calls, module
 
     try:
         operator = "forward" if model.cascade.inverse_problems() else None
         options = calls.emit_options(model, operator=operator)
         found = module.of(model, options).cost
-    except (FormatError, EffectsError, NotInvertibleError):
-        return None
+    except (FormatError, EffectsError, NotInvertibleError) as failure:
+        return None, str(failure)
     which, ram = found.memory.instances[0]
-    return CostOfC(found.dearest[which][CORE].instructions, found.code[CORE] + found.memory.tables, ram)
+    return CostOfC(found.dearest[which][CORE].instructions, found.code[CORE] + found.memory.tables, ram), ""
 
 
 def _outside(name: str, model: Model, item: Item) -> str:

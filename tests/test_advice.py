@@ -20,6 +20,7 @@ from instrument_files import STEP, N, T, V, Y
 
 from hystgen import records
 from hystgen.records import Record, RecordError, parse_columns, read_records
+from hystgen.records.told import time_without_unit
 
 
 class Case(NamedTuple):
@@ -31,6 +32,7 @@ class Case(NamedTuple):
     answers: dict[str, str] = {}  # noqa: RUF012
     which: int = 0
     time: bool = True
+    columns: bool = True
 
 
 def text(names: tuple[str, ...] = ("t", "v", "y"), *columns: Any, above: str = "") -> Callable[[Path], object]:
@@ -102,6 +104,8 @@ CASES: dict[str, Case] = {
     "matrix of two": Case(npz(data=np.column_stack([V, Y])), "a.npz", answers=SECONDS),
     "matrix with a rate": Case(made.matrix_with_rate("fs"), "a.h5"),
     "milliseconds": Case(text(("Time", "v", "y"), np.round(1.7e12 + 1e3 * T).astype(int), V, Y)),
+    "milliseconds that may be seconds": Case(text(("Zeit", "v", "y"), 1e3 * T, V, Y), time=False),
+    "samples counted": Case(text(("t", "v", "y"), np.arange(N), V, Y), answers=SECONDS, columns=False),
     "days": Case(made.days(45678.5, 2.0)),
     "days or seconds": Case(made.days(45678.5, 2.0), which=1),
     "points": Case(text(("v", "y"), V, Y), answers=SECONDS),
@@ -126,14 +130,14 @@ def provoked(case: Case, folder: Path) -> tuple[str, str]:
         (problem, *_) = error.problems
         assert not _ or "first line has numbers" in problem  # one for each file of two
         return source, problem
-    return source, "; ".join(record.notes)
+    return source, "; ".join([*record.notes, time_without_unit([record], None)])
 
 
 def advised(case: Case, source: str, said: str) -> list[Record]:
     """The record, read with the options that the message names."""
     found = list(OPTIONS.finditer(said))
     options: dict[str, Any] = dict(case.options)
-    if found:
+    if found and case.columns:
         match = found[min(case.which, len(found) - 1)]
         columns = match["quoted"] or match["bare"]
         if match["join"]:

@@ -368,7 +368,7 @@ class TestNoValue:
         place = len(lines) if line < 0 else line + 1
         name = "vy"[column - 1]
         assert err == (
-            f"warning: a.csv: 1 sample without a value in v or y or t ({float(value):.6g} in {name} counts as no "
+            f"warning: a.csv: 1 sample without a value in {name} ({float(value):.6g} in {name} counts as no "
             f"value) dropped, the first in line {place}"
         )
         low, high = written(tmp_path / "a.yaml")["input_range"]

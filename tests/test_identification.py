@@ -680,8 +680,8 @@ class TestRefused:
                 SINE,
                 np.where(np.arange(400) < 30, np.nan, SINE),
                 (),
-                "{path}:2:1: error: 30 of 400 samples are without a value in v or y or t, the first in line 2; more "
-                "than 5 % is too much to repair, record or export again",
+                "{path}:2:1: error: 30 of 400 samples are without a value in y, the first in line 2; more than 5 % is "
+                "too much to repair; export every column at one sample rate, with a number in each row",
             ),
             (
                 np.arange(400.0),
@@ -695,7 +695,7 @@ class TestRefused:
                 -SINE,
                 (),
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
-                "the sign of y, otherwise check which column is which",
+                "the sign of y (--columns y=-y), otherwise check which column is which",
             ),
             (
                 SINE, SINE, ("--skip", "0.39"),

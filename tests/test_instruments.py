@@ -304,7 +304,7 @@ def test_an_overrange_of_picoscope_is_no_value(tmp_path: Path) -> None:
     lines[8] = lines[8].rpartition(",")[0] + ",\N{INFINITY}"
     (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-8")
     assert read_record(tmp_path / "a.csv").notes == (
-        "1 sample without a value in v or y or t dropped, the first in line 9",
+        "1 sample without a value in y dropped, the first in line 9",
     )
 
 

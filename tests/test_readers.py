@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import asammdf
+import h5py
 import instrument_files as made
 import numpy as np
 import pandas as pd
@@ -384,7 +386,8 @@ def test_masks_in_memory() -> None:
         record = read_record((T, v, y))
         check(read_record({"t": T, "v": v, "y": y}), fewer=1)
         check(record, fewer=1)
-        assert record.notes == ("1 sample without a value in v or y or t dropped, the first at index 7",)
+        which = "v" if isinstance(v, np.ma.MaskedArray) else "y"
+        assert record.notes == (f"1 sample without a value in {which} dropped, the first at index 7",)
     with pytest.raises(RecordError, match="give the drive and the measured signal"):
         read_record({"t": T, "drive": V})
 
@@ -502,3 +505,57 @@ class TestJoin:
         assert (run.exit_code, "Missing argument 'DATA...'" in run.output) == (2, True)
         run = CliRunner().invoke(cli.main, ["simulate", "m.yaml", "--join", "a.csv", "b.csv", "-o", "b.csv"])
         assert "b.csv is an input and would be overwritten" in run.output
+
+
+def mdf_groups(path: Path, step: int = 1) -> None:
+    file = asammdf.MDF()
+    file.append([asammdf.Signal(V, T, name="Voltage", unit="V")])
+    file.append([asammdf.Signal(Y[::step], T[::step], name="Position", unit="um")])
+    file.save(path, overwrite=True)
+
+
+def test_groups_with_equal_times_are_one_record(tmp_path: Path) -> None:
+    mdf_groups(tmp_path / "a.mf4")
+    record = read_record(tmp_path / "a.mf4")
+    check(record)
+    assert record.units == {"t": "s", "v": "V", "y": "um"}
+
+
+def test_groups_with_two_rates_are_refused_with_what_to_type(tmp_path: Path) -> None:
+    mdf_groups(tmp_path / "a.mf4", 2)
+    with pytest.raises(RecordError, match="the columns differ in length") as refused:
+        read_record(tmp_path / "a.mf4", columns={"t": "0/time"})
+    typed = str(refused.value).partition("in Python, ")[2].replace("SECONDS", repr(made.STEP))
+    eval(typed.replace("resampled.mf4", str(tmp_path / "resampled.mf4")), {"asammdf": asammdf})
+    record = read_record(tmp_path / "resampled.mf4")
+    np.testing.assert_allclose(record.v, V[: len(record)], atol=1e-9)
+    np.testing.assert_allclose(record.y[::2], Y[: len(record)][::2], atol=1e-9)  # type: ignore[index]
+
+
+def test_single_columns_without_a_header_are_joined(tmp_path: Path) -> None:
+    for name, x in (("v.txt", V), ("y.txt", Y)):
+        np.savetxt(tmp_path / name, x, "%.6f")
+    check(read_record(f"{tmp_path / 'v.txt'}+{tmp_path / 'y.txt'}", sample_time=made.STEP))
+
+
+def test_a_frame_of_pandas_is_refused_with_what_to_type(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run/block0_values"] = np.column_stack([T, V, Y])
+        file["run/axis1"] = np.arange(len(T))
+        file["run"].attrs["pandas_type"] = np.bytes_(b"frame")
+    with pytest.raises(RecordError, match=r"pandas\.read_hdf\('[^']*a\.h5', 'run'\)\.to_parquet\("):
+        read_record(tmp_path / "a.h5")
+
+
+def test_a_part_of_an_archive_is_proposed_among_the_most_frequent_kind(tmp_path: Path) -> None:
+    text = made.csv_text().encode()
+    (tmp_path / "a.zip").write_bytes(made.zipped({"1.csv": text, "2.csv": text, "notes.txt": b"hello"}))
+    with pytest.raises(RecordError, match=r"as in .*a\.zip/2\.csv$"):
+        read_record(tmp_path / "a.zip")
+
+
+def test_a_sample_time_does_not_hide_that_joined_files_start_apart(tmp_path: Path) -> None:
+    for name, x, start in (("v.csv", V, 0.0), ("y.csv", Y, 0.5), ("same.csv", Y, 0.0)):
+        (tmp_path / name).write_text(made.channel(x, start=start))
+    assert "start at different times" in refused(f"{tmp_path / 'v.csv'}+{tmp_path / 'y.csv'}", sample_time=STEP)
+    check(read_record(f"{tmp_path / 'v.csv'}+{tmp_path / 'same.csv'}", sample_time=STEP))

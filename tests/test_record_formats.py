@@ -169,7 +169,7 @@ def test_names_are_mapped_and_faults_counted_in_every_format(
     where = ("in line 9", "in line 22") if name == "a.csv" else ("at index 7", "at index 20")
     reported = [note for note in record.notes if "dropped" in note]
     assert reported == [
-        f"1 sample without a value in v or y or t dropped, the first {where[0]}",
+        f"1 sample without a value in v dropped, the first {where[0]}",
         f"1 sample not later than the sample before dropped, the first {where[1]}",
     ]
 
@@ -437,7 +437,7 @@ def test_nulls_and_text_in_parquet(tmp_path: Path) -> None:
     assert list(record.extra) == ["n"]
     assert np.isnan(record.extra["n"][0])
     assert record.notes[0] == "columns without numbers were left out: state"
-    assert "1 sample without a value in v or y or t dropped, the first at index 7" in record.notes
+    assert "1 sample without a value in v dropped, the first at index 7" in record.notes
     (problem,) = problems(tmp_path / "a.parquet", columns={"v": "state"})
     assert problem.startswith('"state" is not a column of numbers')
 
@@ -916,7 +916,7 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
     record = read_record(tmp_path / "some.csv")
     assert len(record) == 1998
     assert record.notes[1:] == (
-        f"1 sample without a value in v or y or t dropped, the first in line {1200 + 2 + 3}",
+        f"1 sample without a value in v dropped, the first in line {1200 + 2 + 3}",
         f"1 sample not later than the sample before dropped, the first in line {1500 + 2 + 3}",
     )
     some[900][2] = "fault"

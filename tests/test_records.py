@@ -129,7 +129,7 @@ class TestRead:
             record = read_record(tmp_path / name)
             assert np.array_equal(record.v, np.delete(v, 5))
             assert list(record.extra) == ["temperature"]
-            assert "1 sample without a value in v or y or t dropped, the first at index 5" in record.notes
+            assert "1 sample without a value in y dropped, the first at index 5" in record.notes
             assert any("comment" in note for note in record.notes)
 
     def test_section(self, tmp_path: Path) -> None:
@@ -157,7 +157,7 @@ class TestRepair:
         record = read_record(write(tmp_path / "a.csv", cells))
         assert len(record) == 97
         assert np.isfinite(record.v).all()
-        assert record.notes[0] == "3 samples without a value in v or y or t dropped, the first in line 9"
+        assert record.notes[0] == "3 samples without a value in v or y dropped, the first in line 9"
         assert "1 gap" not in record.notes[0]
 
     def test_time_that_does_not_rise_is_dropped_and_counted(self, tmp_path: Path) -> None:
@@ -188,15 +188,13 @@ class TestRepair:
         cells[15][2] = "nan"
         (problem,) = problems(write(tmp_path / "b.csv", cells))
         assert problem == (
-            ":12:1: error: 6 of 100 samples are without a value in v or y or t, the first in line 12; more than 5 % is "
-            "too much to repair, record or export again"
+            ":12:1: error: 6 of 100 samples are without a value in y, the first in line 12; more than 5 % is too much "
+            "to repair; export every column at one sample rate, with a number in each row"
         )
         values = {name: column.copy() for name, column in zip("tvy", np.array(cells, dtype=float).T, strict=True)}
         np.savez(tmp_path / "b.npz", **values)
         (problem,) = problems(tmp_path / "b.npz")
-        assert problem.startswith(
-            ": error: 6 of 100 samples are without a value in v or y or t, the first at index 10;"
-        )
+        assert problem.startswith(": error: 6 of 100 samples are without a value in y, the first at index 10;")
 
     def test_time_that_goes_back_for_good_is_refused(self, tmp_path: Path) -> None:
         cells = rows(100)
@@ -204,7 +202,7 @@ class TestRepair:
         (problem,) = problems(write(tmp_path / "a.csv", cells))
         assert problem == (
             ":13:1: error: 89 of 100 samples are not later than the sample before, the first in line 13; more than 5 % "
-            "is too much to repair, record or export again"
+            "is too much to repair; correct the time there, or, if it starts again, give each run a file of its own"
         )
 
     def test_lines_count_comments_and_blank_lines(self, tmp_path: Path) -> None:

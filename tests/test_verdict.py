@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -69,7 +70,8 @@ def test_the_verdict_is_what_the_figures_say(what: str) -> None:
 @pytest.mark.parametrize(("what", "code", "command"), [
     ("good", 0, "hystgen emit {m} -o firmware/"),
     ("a lag", 0, "hystgen diagnose {m} {r} -o diagnosis/"),
-    ("pure noise", 1, "hystgen identify {r} -o {m} --columns t=..,v=..,y=.."),
+    ("pure noise", 1, "hystgen identify {r} -o {m} --report report/"),
+    ("exchanged", 1, "hystgen identify {r} --columns v=y,y=v -o {m}"),
     ("drowned", 0, "hystgen diagnose --plan {m} -o plan/"),
 ])  # fmt: skip
 def test_the_next_step_and_the_exit_code(run: Run, tmp_path: Path, what: str, code: int, command: str) -> None:
@@ -79,3 +81,35 @@ def test_the_next_step_and_the_exit_code(run: Run, tmp_path: Path, what: str, co
     assert f"    {command.format(m=model, r=record)}\n" in table
     assert ("the model is of no use" in said) == bool(code)
     assert run("identify", record, "-o", model)[0] == 0
+
+
+def test_the_next_command_reads_the_record_as_this_one_did(run: Run, tmp_path: Path) -> None:
+    """Each printed command is run: with the columns exchanged, the sign changed, and the options given before."""
+    v, y, _, _ = RECORDS["a lag"]
+    model = tmp_path / "m.yaml"
+
+    def printed(table: str, command: str) -> list[str]:
+        return shlex.split(next(line for line in table.splitlines() if line.startswith(f"    hystgen {command} ")))[1:]
+
+    path = tmp_path / "exchanged.csv"
+    np.savetxt(path, np.column_stack([T, y, v]), delimiter=",", header="Zeit,Voltage,Position", comments="")
+    code, table, said = run("identify", path, "-o", model, "--skip", "0.5")
+    assert code == 0, said
+    exchanged = printed(table, "identify")
+    assert exchanged[-6:] == ["--skip", "0.5", "--columns", "v=y,y=v", "-o", str(model)]
+    code, table, said = run(*exchanged)
+    assert code == 0
+    assert "v = Position, y = Voltage" in said
+    assert printed(table, "diagnose")[3:7] == ["--skip", "0.5", "--columns", "v=y,y=v"]
+    path = tmp_path / "falls.csv"
+    np.savetxt(path, np.column_stack([T, v, -y]), delimiter=",", header="Zeit,Kanal A,Kanal B", comments="")
+    names = ("--columns", "t=Zeit,v=Kanal A,y=-Kanal B")
+    code, _, said = run("identify", path, "-o", model, "--columns", "t=Zeit,v=Kanal A,y=Kanal B")
+    assert code == 2
+    assert "change the sign of y (--columns y=-y)" in said
+    code, table, said = run("identify", path, "-o", model, *names)
+    assert code == 0
+    assert "y = Kanal B with its sign changed" in said
+    assert printed(table, "diagnose")[3:5] == list(names)
+    signed = hystgen.records.read_record(str(path), columns={"v": "#2", "y": "-#3"})
+    np.testing.assert_array_equal(signed.y, np.loadtxt(path, delimiter=",", skiprows=1)[:, 2] * -1.0)

@@ -16,8 +16,10 @@ def package(source: object) -> str:
     return next((name for name in PACKAGES if name in roots), "")
 
 
-def refuse(name: str, source: object) -> None:
-    """Raise TypeError, saying what to pass instead, for an object of these packages that is not a table of samples."""
+def refuse(name: str, source: object, record: bool = False) -> None:
+    """Raise TypeError, saying what to pass instead, for an object of these packages that is not a table of samples.
+
+    `record`: whether several signals are needed."""
     of, kind = package(source), type(source).__name__
     if of == "polars" and kind == "LazyFrame":
         raise TypeError(f"{name} is a LazyFrame, which has no values yet; pass its .collect()")
@@ -29,6 +31,8 @@ def refuse(name: str, source: object) -> None:
         )
     if of == "xarray" and kind == "Dataset":
         raise TypeError(f"{name} is a Dataset of xarray; pass its .to_dataframe().reset_index(), or a variable of it")
+    if of == "xarray" and record:
+        raise TypeError(f"{name} is one DataArray; pass those of drive and output in a dict, {{'v': .., 'y': ..}}")
     if of == "xarray" and getattr(source, "ndim", 1) != 1:
         dims = ", ".join(map(str, getattr(source, "dims", ())))
         raise TypeError(f"{name} is a DataArray over ({dims}); select along all of them but one")

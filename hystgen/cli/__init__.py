@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import difflib
 import gc
 import importlib
 import os
@@ -29,6 +30,24 @@ class _Commands(console.Commands):
             return None
         found: click.Command = getattr(importlib.import_module(f"hystgen.cli.{cmd_name}"), cmd_name)
         return found
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command; for an unknown one, a failure that says which may be meant."""
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            close = difflib.get_close_matches(args[0], COMMANDS, 1)
+            meant = OTHERWISE.get(args[0]) or (close[0] if close else "")
+            ctx.fail(f"No such command '{args[0]}'." + (f" Did you mean '{meant}'?" if meant else ""))
+        return super().resolve_command(ctx, args)
+
+
+OTHERWISE = {
+    "plan": "diagnose --plan", "fit": "identify", "invert": "simulate --operator inverse",
+    "inverse": "simulate --operator inverse", "raster": "simulate --operator inverse",
+    "fleet": "identify --batch", "batch": "identify --batch", "report": "identify --report", "plot": "show --plot",
+}
+"""Words for which there is no command of that name, and what does it."""
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})

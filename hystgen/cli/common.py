@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import click
+from click.core import ParameterSource
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
@@ -111,6 +112,19 @@ def load_model(path: str, effects: Sequence[str] = ()) -> Model:
     return guarded(path, lambda: load(path, effects))
 
 
+class Seconds(click.ParamType[float]):
+    """A number of seconds."""
+
+    name = "seconds"
+
+    def convert(self, value: str | float, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number; a failure if it is none, as with a unit behind it."""
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"'{value}' is not a number; give seconds, without a unit, as in 0.005", param, ctx)
+
+
 def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
     if not 0 <= value < math.inf:
         raise click.BadParameter("give seconds, 0 or more")
@@ -157,7 +171,7 @@ layout_option = click.option(
     show_default=True,
 )
 skip_option = click.option(
-    "--skip", type=float, callback=seconds, default=0.0,
+    "--skip", type=Seconds(), callback=seconds, default=0.0,
     help="seconds at the start of every record to leave out of the comparison; their drive still counts",
 )
 def _skew(_context: click.Context, _option: click.Parameter, value: str | None) -> float | str | None:
@@ -264,6 +278,21 @@ def joined(pairs: tuple[tuple[str, str], ...]) -> list[str]:
     return [records.MARK.join(pair) for pair in pairs]
 
 
+AGAIN = ("columns", "sample_time", "delimiter", "history", "rest", "skip", "clock_skew")
+"""Options about records that the next command with the same records has to repeat."""
+
+
+def repeated() -> dict[str, str]:
+    """The options of the running command that say how its records are read and compared, as the user gave them."""
+    context = click.get_current_context()
+    given = {
+        option.opts[0]: context.params[option.name]
+        for option in context.command.params
+        if option.name in AGAIN and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+    }
+    return {option: str(value) for option, value in given.items()}
+
+
 class ReadingArguments(TypedDict):
     """Command-line arguments for reading records."""
 
@@ -296,7 +325,7 @@ _RECORD_OPTIONS = [
         help="names t, v, y for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
         "number, 1,2,3 for t, v, y",
     ),
-    click.option("--sample-time", type=float, help="sample time in seconds, for files without time"),
+    click.option("--sample-time", type=Seconds(), help="sample time in seconds, for files without time"),
     click.option("--delimiter", help="default: detected from the file"),
     click.option(
         "--join", nargs=2, multiple=True, type=click.Path(), metavar="DRIVE MEASURED",
@@ -304,7 +333,7 @@ _RECORD_OPTIONS = [
     ),
     click.option("--history", metavar="V,V,..", help="drive values visited before each record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
+        "--rest", type=Seconds(), callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
     ),
 ]
 

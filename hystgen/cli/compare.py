@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from hystgen.model import Model
 
 
+PARAMETER_FILES = (".yaml", ".yml")
+
+
 class _Holding(click.Command):
     """A command whose `--holdout` also takes the further files to which a shell expands a pattern, as in `held/*.csv`.
 
@@ -30,7 +33,7 @@ class _Holding(click.Command):
                 value = False
             elif word.startswith("-"):
                 value = holding = word == "--holdout"
-            elif holding and Path(word).suffix.lower() not in (".yaml", ".yml"):
+            elif holding and Path(word).suffix.lower() not in PARAMETER_FILES:
                 words.append("--holdout")
             words.append(word)
         return super().parse_args(ctx, words)
@@ -64,7 +67,9 @@ def compare(
 
     holdout = (*holdout, *common.joined(join))
     if not holdout:
-        raise click.UsageError("Missing option '--holdout'.")
+        files = [path for path in params if Path(path).suffix.lower() not in PARAMETER_FILES]
+        example = f", as in --holdout {files[0] if files else 'other.csv'}"
+        raise click.UsageError(f"Missing option '--holdout': give the records to compare on{example}")
     common.guarded(params[0], partial(extras.require_fit, "compare", plot=bool(plot or output)))
     from hystgen.comparison import Comparison
     from hystgen.report import comparison as report
@@ -87,6 +92,9 @@ def compare(
     for note in found.notes:
         console.note(f"warning: {note}")
     console.say(found.table())
+    step, command = found.next_step()
+    if step:
+        console.say(f"Your next step: {step}:\n    {command}\n")
     if json_file:
         common.guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
         console.say(json_file)

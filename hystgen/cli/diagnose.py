@@ -126,6 +126,7 @@ def diagnose(
     from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
+    from hystgen.identification.verdict import typed
     from hystgen.planning.session import Session
     from hystgen.report import diagnosis as report
 
@@ -155,9 +156,11 @@ def diagnose(
         console.say(found.sentence())
         if found.not_emitted():
             console.note(found.not_emitted())
-        step, command = found.next_step()
-        named = command.replace("params.yaml", shlex.quote(str(Path(output) / "params.yaml")))
-        console.say(f"Your next step: {step}:\n    {named}\n")
+        again = typed(common.repeated())
+        named = " ".join(map(shlex.quote, data)) + "".join(f" --holdout {shlex.quote(each)}" for each in holdout)
+        judged = " ".join(map(shlex.quote, holdout or data))
+        step, command = found.next_step(shlex.quote(str(Path(output) / "params.yaml")), named + again, judged + again)
+        console.say(f"Your next step: {step}:\n    {command}\n")
         for path in found.write(output):
             console.say(str(path))
 

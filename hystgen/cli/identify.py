@@ -134,7 +134,7 @@ def identify(
         fit = older.on(fit)
         fit.write(output)
         console.say(fit.table())
-        step, command = fit.verdict.next_step(output, data, holdout)
+        step, command = fit.verdict.next_step(output, data, holdout, options=common.repeated())
         console.say(f"{capital(fit.verdict.why)}. Your next step: {step}:\n    {command}\n")
         console.say(output)
         if plot:

@@ -215,7 +215,7 @@ def identify(
     offset = rounded(errors[0].offset, pi.DIGITS)
     step = next((rounded(record.sample_time, STEP_DIGITS) for record in fit_records if record.timed), None)
     parameters = _parameters(name, units, step, drive, fitted, offset, compared[0])
-    said = verdict.verdict(errors, held_errors, quality.wrong_way(fitted), (units or {}).get("output", ""))
+    said = verdict.verdict(errors, held_errors, quality.direction(fitted), (units or {}).get("output", ""))
     if strict and said.useless:
         raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")
     return Fit(parameters, tuple(rows), tuple(reported), sure, masks, said, before, tuple(read))
@@ -288,6 +288,14 @@ def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: gpi.
     return _compared(fitted, compared, begun)
 
 
+LONGER = "hold out a longer record"
+
+SWEPT = (
+    "the others depend on moves before the record: begin it with a sweep over the drive's range, or give --history"
+)
+"""Advice for a held-out record with too few samples, and for one of which too few can be compared."""
+
+
 def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Course]) -> _Tried:
     """A fit with its errors on held-out courses."""
     largest = float(fitted.solution.thresholds[-1])
@@ -295,8 +303,8 @@ def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Cours
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
-                f"{item.name} is held out, but only {item.used} of its samples can be compared, and at least "
-                f"{SHORTEST} are needed; hold out a longer record"
+                f"{item.name} is held out, but only {item.used} of its {len(item.v)} samples can be compared, and at "
+                f"least {SHORTEST} are needed; {LONGER if len(item.v) < 2 * SHORTEST else SWEPT}"
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, ErrorRow.of("held out", "written", errors))

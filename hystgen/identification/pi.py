@@ -33,8 +33,8 @@ DUST = 1e-9
 """A weight below this fraction of the sum of weights is rounding error, not a play."""
 
 FALLS = (
-    "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
-    "otherwise check which column is which"
+    "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y "
+    "(--columns y=-y), otherwise check which column is which"
 )
 """The message if no play has a positive weight."""
 
@@ -176,12 +176,12 @@ SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
 twentieth faster are included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
-    "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
-    "is which"
+    "y falls when v rises; if the sensor counts the other way, change the sign of y (--columns y=-y), otherwise check "
+    "which column is which"
 )
 
 EXCHANGE = (
-    "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=..,y=..): the model "
+    "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=y,y=v): the model "
     "then gives the displacement"
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -332,14 +333,12 @@ def about_model(
     return reported
 
 
-def wrong_way(fitted: FittedModel) -> str:
-    """What is wrong with the direction of the output or its loops, as far as the model cannot follow it; else empty."""
+def direction(fitted: FittedModel) -> Literal["", "falls", "clockwise"]:
+    """How the output or its loops run against the model, as far as it cannot follow them; else empty."""
     sense = fitted.solution.sense
     if sense.falls:
-        return "y falls when v rises, which the model cannot follow"
-    if sense.clockwise and fitted.parallel is None:
-        return "the loops run clockwise, which the model cannot follow: the columns may be exchanged"
-    return ""
+        return "falls"
+    return "clockwise" if sense.clockwise and fitted.parallel is None else ""
 
 
 def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:

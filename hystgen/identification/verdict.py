@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from hystgen.identification import faults, pi, quality
 from hystgen.identification.pi import FreeRunErrors, IdentificationError
 from hystgen.identification.reduction import Course
+from hystgen.records.columns import parse_columns
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,16 @@ HALF = 0.5
 """[fraction of the variance of the output] A model that explains less leaves more than it explains."""
 
 Kind = Literal["good", "missing", "untold", "wrong"]
+
+Direction = Literal["", "falls", "clockwise"]
+"""How the output or its loops run against the model."""
+
+WRONG_WAY = {
+    "falls": "y falls when v rises, which the model cannot follow",
+    "clockwise": "the loops run clockwise, which the model cannot follow: the columns may be exchanged",
+}
+
+NO_OPTIONS: Mapping[str, str] = MappingProxyType({})
 
 MOST_NAMED = 3
 """More records than this are not named in a command."""
@@ -49,31 +61,52 @@ class Verdict:
     kind: Kind
     why: str
     useless: bool = False
+    direction: Direction = ""
 
     def next_step(
-        self, parameter_file: str, records: Sequence[str], held: Sequence[str] = (), operator: str = ""
+        self, parameter_file: str, records: Sequence[str], held: Sequence[str] = (), operator: str = "",
+        options: Mapping[str, str] = NO_OPTIONS,
     ) -> tuple[str, str]:
-        """The next step, and its command; `records`, `held`: the files given, `operator`: an option of `emit`."""
+        """The next step, and its command; `records`, `held`: the files given, `operator`: an option of `emit`,
+        `options`: how the records were read and compared, to be given again."""
         data = " ".join(map(shlex.quote, records)) if len(records) <= MOST_NAMED else "RECORDS"
         data += "".join(f" --holdout {shlex.quote(each)}" for each in (held if len(held) <= MOST_NAMED else ["OTHERS"]))
-        file = shlex.quote(parameter_file)
+        file, again = shlex.quote(parameter_file), typed(options)
+        if self.direction:
+            columns = parse_columns(options["--columns"]) if "--columns" in options else {}
+            said, changed = _turned(self.direction, columns)
+            again = typed({**options, "--columns": ",".join(f"{ours}={theirs}" for ours, theirs in changed.items())})
+            return f"{said}, and fit again", f"hystgen identify {data}{again} -o {file}"
         return {
             "good": ("write the C", f"hystgen emit {file} -o firmware/{operator}"),
-            "missing": ("find out what the model is missing", f"hystgen diagnose {file} {data} -o diagnosis/"),
+            "missing": ("find out what the model is missing", f"hystgen diagnose {file} {data}{again} -o diagnosis/"),
             "untold": ("take another record, with drives that show it", f"hystgen diagnose --plan {file} -o plan/"),
             "wrong": (
-                "check the columns and the records, and fit again",
-                f"hystgen identify {data} -o {file} --columns t=..,v=..,y=..",
+                "look at the record, check the columns, and fit again",
+                f"hystgen identify {data}{again} -o {file} --report report/",
             ),
         }[self.kind]
 
 
+def typed(options: Mapping[str, str]) -> str:
+    """Options as they are typed in a shell, each after a space."""
+    return "".join(f" {option} {shlex.quote(value)}" for option, value in options.items())
+
+
+def _turned(direction: Direction, columns: Mapping[str, str]) -> tuple[str, dict[str, str]]:
+    """What to do about a direction that no model follows, and the columns that do it instead of those given."""
+    v, y = columns.get("v", "v"), columns.get("y", "y")
+    if direction == "clockwise":
+        return "exchange the columns", {**columns, "v": y, "y": v}
+    return "change the sign of y", {**columns, "y": y.removeprefix("-") if y.startswith("-") else f"-{y}"}
+
+
 def verdict(
-    own: Sequence[FreeRunErrors], held: Sequence[FreeRunErrors], wrong_way: str, unit: str
+    own: Sequence[FreeRunErrors], held: Sequence[FreeRunErrors], direction: Direction, unit: str
 ) -> Verdict:
     """The verdict on a model with errors `own` on the records it was fitted to and `held` on those held out, if any.
 
-    `wrong_way`: what is wrong with the direction of the output or its loops, if anything; `unit`: of the output.
+    `direction`: how the output or its loops run against the model, if they do; `unit`: of the output.
     """
     judged = held or own
     left, noise = _rms([each.error for each in judged]), _noise(judged)
@@ -83,8 +116,8 @@ def verdict(
     least = max((COLOURED if times < SHORT else ABOVE_NOISE) * noise, little)
     line, share = _line(own, judged), max(_explained(own), _explained(judged))
     off = f"on {of} the model is off by {left:.3g}{u} rms"
-    if wrong_way:
-        return Verdict("wrong", wrong_way, True)
+    if direction:
+        return Verdict("wrong", WRONG_WAY[direction], True, direction)
     if share < HALF:
         return Verdict("wrong", f"the model explains only {100.0 * share:.0f} % of the variance of the output", True)
     if left > least:

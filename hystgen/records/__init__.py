@@ -200,7 +200,8 @@ def _read(
         return repaired(reading, _table(reading))
     reading.name = " + ".join(os.path.basename(each) for each in channels)
     times = {"t": reading.columns["t"]} if "t" in reading.columns else {}
-    parts = [Reading(each, times, sample_time, delimiter, (), tick, channel=True) for each in channels]
+    # Without the given sample time, since the times that files do have show whether they start together
+    parts = [Reading(each, times, None, delimiter, (), tick, channel=True) for each in channels]
     tables, refused = [], []
     for part in parts:
         try:

@@ -299,7 +299,7 @@ STANDARD = ("t", "v", "y")
 MEANINGS = {
     "t": frozenset(("t", "time", "times", "timestamp", "zeit", "temps", "tiempo")),
     "v": frozenset(
-        ("v", "u", "voltage", "volt", "volts", "drive", "input", "spannung", "voltaje", "antrieb", "ansteuerung")
+        ("v", "u", "hv", "voltage", "volt", "volts", "drive", "input", "spannung", "voltaje", "antrieb", "ansteuerung")
     ),
     "y": frozenset(
         ("y", "displacement", "disp", "position", "pos", "output", "deflection", "elongation", "stroke", "weg",
@@ -450,8 +450,11 @@ class Finder:
                     missing.append(ours)
             # Names come first; meaning only decides among the remaining columns
             for ours in missing:
-                chosen = None if ours in self.mapping else self._meant(ours, found, self._folders(found, need))
-                if chosen is not None:
+                theirs, unit = split_unit(self.mapping[ours]) if ours in self.mapping else (ours, "")
+                # v=y takes a column called Position too, t=t [ms] one called Time
+                chosen = self._meant(theirs, found, self._folders(found, need)) if theirs in (ours, *STANDARD) else None
+                if chosen is not None and (not unit or not chosen.unit):
+                    chosen.unit = chosen.unit or unit
                     found[ours] = self.understood[ours] = chosen
                     continue
                 if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
@@ -540,7 +543,8 @@ class Finder:
             times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
             others = iter([c for c in free if c not in times])
             answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
-            if None not in answers.values() and next(others, None) is None:
+            left = next(others, None)
+            if None not in answers.values() and (left is None or unnamed == ["u"]):  # of several axes, the first
                 said = ",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)
                 return f', for example --columns "{said}"'
         return ""

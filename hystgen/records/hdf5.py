@@ -13,6 +13,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.problems import printable
 from hystgen.records import mat_objects
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
 from hystgen.records.columns import Column, Step, from_number, is_named
@@ -76,6 +77,12 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 of = f"{folder}{name}" if isinstance(found, h5py.Dataset) else f"{folder}{name}/"
                 steps.extend(_attributes(found, of))
             if not isinstance(found, h5py.Dataset):
+                kind = found.attrs.get("pandas_type", b"") if isinstance(found, h5py.Group) else b""
+                if np.bytes_(kind).startswith(b"frame"):
+                    raise reading.refuse(
+                        f"{printable(path)} is a data frame in pandas' own layout; save it as Parquet, in Python: "
+                        f"pandas.read_hdf({reading.file!r}, {path!r}).to_parquet('frame.parquet')"
+                    )
                 columns.extend(_list_of_structs(reading, file, found, f"{folder}{name}.") if matlab else ())
                 return
             length = _length(found, matlab)

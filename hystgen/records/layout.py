@@ -260,16 +260,17 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableL
                     f"name columns by their numbers with --columns {EXAMPLES.get(view.width, EXAMPLE)}",
                     above[-1].number,
                 )
-        if reading.channel:
+        if reading.channel and view.width > 1:
             raise reading.refuse(
                 "the first line has numbers, not names; say which column is the time with --columns t=#1", first
             )
         of = {1: "drive", 2: "drive, measured"}.get(view.width, "time, drive, measured")
-        raise reading.refuse(
-            f"the first line has numbers, not names; say which columns they are with --columns "
-            f"{EXAMPLES.get(view.width, EXAMPLE)} ({of}), or put a header such as t,v,y above them",
-            first,
-        )
+        if not reading.channel:
+            raise reading.refuse(
+                f"the first line has numbers, not names; say which columns they are with --columns "
+                f"{EXAMPLES.get(view.width, EXAMPLE)} ({of}), or put a header such as t,v,y above them",
+                first,
+            )
     return TableLayout(view.dialect, [str(k + 1) for k in range(view.width)], first)
 
 

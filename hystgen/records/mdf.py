@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import IO, TYPE_CHECKING, Protocol, TypeVar, cast
 
@@ -41,12 +41,17 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
         columns: list[Column] = []
         ignored: list[str] = []
         groups = cast("list[_Group]", file.groups)  # of one of two classes, by the version
-        many = sum(group.channel_group.cycles_nr > 1 for group in groups) > 1
+        many = _apart(file, groups)
+        reading.same_length = (
+            f'resample them in Python, asammdf.MDF({reading.file!r}).resample(SECONDS).save("resampled.mf4")'
+        )
         for number, group in enumerate(groups):
             folder = f"{number}/" if many else ""
             length = int(group.channel_group.cycles_nr)
             master = file.masters_db.get(number)
             for place, channel in enumerate(group.channels):
+                if place == master and not many and any(c.unit == "s" for c in columns):
+                    continue  # the same times as those of an earlier group
                 first = file.get(group=number, index=place, record_count=1, ignore_invalidation_bits=True)
                 if length < 2 or first.samples.dtype.kind not in "fiub" or first.samples.ndim != 1:
                     ignored.append(folder + channel.name)
@@ -55,6 +60,16 @@ def read_mdf(reading: Reading, _stream: IO[bytes]) -> Table:
                 read = partial(_samples, file, number, place)
                 columns.append(Column(channel.name, folder, unit, length, read))
         return reading.table(columns, ignored)
+
+
+def _apart(file: MDF, groups: Sequence[_Group]) -> bool:
+    """Whether the channels are in several groups with times of their own, or with equal names."""
+    filled = [k for k, group in enumerate(groups) if group.channel_group.cycles_nr > 1]
+    if len(filled) < 2:
+        return False
+    names = [c.name for k in filled for place, c in enumerate(groups[k].channels) if place != file.masters_db.get(k)]
+    first, *others = (file.get_master(k) for k in filled)
+    return len(set(names)) < len(names) or not all(np.array_equal(first, each) for each in others)
 
 
 def _opened(library: Callable[[str], File], path: str) -> File | None:

@@ -48,7 +48,7 @@ _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
 
 def in_memory(source: object) -> TypeGuard[Columns]:
     """Whether something holds the samples of one record, judged by its type alone."""
-    foreign.refuse("a record", source)
+    foreign.refuse("a record", source, record=True)
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
     # A list may contain paths or records, so only tuples hold arrays

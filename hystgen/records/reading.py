@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from json import JSONDecodeError
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 import numpy as np
@@ -102,7 +102,9 @@ class Reading:
     the file does not state plainly; `channel`: whether the file holds one channel of a record in several files;
     `name`: the record's; `path`: the file with the bytes to read, which differs from `file` for one that had to be
     unpacked; `part`: the table, sheet or member that the user appends to the path; `origin`: nanoseconds since year 1
-    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it.
+    of the first time, if the file has dates; `start`: the time of a waveform's first sample, as the file states it;
+    `negated`: our names of the columns whose sign is to be changed, `y=-Position`; `same_length`: advice about columns
+    of different lengths.
     """
 
     file: str
@@ -122,9 +124,13 @@ class Reading:
     part: str = ""
     origin: int | None = None
     start: str = ""
+    negated: Set[str] = frozenset()
+    same_length: str = "export them with one length"
 
     def __post_init__(self) -> None:
         self.name, self.path = self.name or Path(self.file).name, self.path or self.file
+        self.negated = {ours for ours, theirs in self.columns.items() if theirs[:1] == "-" != theirs}
+        self.columns = {ours: theirs[ours in self.negated :] for ours, theirs in self.columns.items()}
         if self.delimiter in ("\\t", "tab"):
             self.delimiter = "\t"
 
@@ -165,7 +171,9 @@ class Reading:
         shown = ", ".join(map(printable, names[:LISTED])) + (f" and {len(names) - LISTED} more" * (len(names) > LISTED))
         base = self.file.removesuffix(f"/{self.part}") if self.part else self.file
         wrong = f"no {what} {printable(self.part)} among" if self.part else f"{len(names)} {what}s:"
-        raise self.refuse(f"has {wrong} {shown}; {advice}, as in {base}/{printable(names[-1])}")
+        suffixes = [PurePosixPath(name).suffix for name in names]
+        last = next(name for name in names[::-1] if PurePosixPath(name).suffix == max(suffixes, key=suffixes.count))
+        raise self.refuse(f"has {wrong} {shown}; {advice}, as in {base}/{printable(last)}")
 
     def refuse_if_any(self) -> None:
         """Raise RecordError with the problems found so far, if any."""
@@ -228,7 +236,7 @@ class Reading:
         """Raise RecordError if columns differ in length."""
         if len({c.length for c in chosen.values()}) > 1:
             parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
-            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
+            raise self.refuse(f"the columns differ in length: {parts} samples; {self.same_length}")
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
         """The columns not requested, keyed by the names they get; a column whose name is taken is noted."""
@@ -296,7 +304,7 @@ class Reading:
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
             example = "1,2,3 (time, drive, measured)"
             if width == 2 or steps:
-                example = f"1,2 (drive, measured){'' if steps else ' with --sample-time'}"
+                example = f"1,2{'' if steps else ' --sample-time SECONDS'} (drive, measured)"
             raise self.refuse(
                 f"{printable(name)} is a matrix of {width} columns; say which they are with --columns {example}"
             )
@@ -315,6 +323,9 @@ class Reading:
                 several, s = ("numbers such as ", "") if len(written) > 1 else ("", "s")
                 self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as no value"
             x[wrong] = np.nan
+            if name in self.negated:
+                np.negative(x, out=x)
+                self.understood(f"{name} = {printable(taken[name].own)} with its sign changed")
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
             raise self.refuse(
@@ -436,11 +447,14 @@ def repaired(reading: Reading, table: Table) -> Record:
     needed = [name for name in reading.need if name in columns]
     if "t" in columns:
         needed.append("t")
+    lacking = []
     for name in dict.fromkeys(needed):
-        keep &= np.isfinite(columns[name])
+        present = np.isfinite(columns[name])
+        keep &= present
+        lacking += [] if np.all(present) else [name]
     fills = "; ".join(said for name, said in reading.fills.items() if name in needed)
-    which = f"without a value in {' or '.join(dict.fromkeys(needed))}{f' ({fills})' if fills else ''}"
-    _drop(reading, table, length, ~keep, which)
+    which = f"without a value in {' or '.join(lacking)}{f' ({fills})' if fills else ''}"
+    _drop(reading, table, length, ~keep, which, EXPORT_WHOLE)
     reading.notes += [f"{name}: {said}" for name, said in reading.fills.items() if name not in needed]
     if "t" in columns and _repeats(columns["t"][keep]):
         columns["t"] = _even(reading, table, columns["t"], keep)
@@ -466,6 +480,9 @@ def repaired(reading: Reading, table: Table) -> Record:
         reading.notes.append("no time: read as points taken one by one; give --sample-time if they are evenly spaced")
     if "t" in columns:
         t = columns.pop("t")
+        if reading.sample_time and "t" not in table.units and _counts(t):
+            t *= reading.sample_time
+            reading.understood(f"t counts samples, {reading.sample_time:g} s each")
         step = _step(reading, t)
     else:
         step = reading.sample_time or 1.0
@@ -485,8 +502,15 @@ def _cut(columns: dict[str, Array], needed: Set[str]) -> None:
         columns[name] = columns[name][: last + 1]
 
 
-def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
-    """Note the dropped samples, or refuse the file if there are too many."""
+EXPORT_WHOLE = "export every column at one sample rate, with a number in each row"
+
+SPLIT = "correct the time there, or, if it starts again, give each run a file of its own"
+
+
+def _drop(
+    reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str, advice: str = SPLIT
+) -> None:
+    """Note the dropped samples, or refuse the file with `advice` if there are too many."""
     number = int(np.count_nonzero(wrong))
     if not number:
         return
@@ -496,11 +520,16 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
     if number > REPAIRABLE * length:
         reading.problem(
             f"{number} of {length} samples {'is' if number == 1 else 'are'} {which}, {first}; more than "
-            f"{100 * REPAIRABLE:g} % is too much to repair, record or export again",
+            f"{100 * REPAIRABLE:g} % is too much to repair; {advice}",
             line,
         )
     else:
         reading.notes.append(f"{counted(number, 'sample')} {which} dropped, {first}")
+
+
+def _counts(t: Array) -> bool:
+    """Whether a time without a unit is a number of samples, 0, 1, 2 and so on, of which a few may be missing."""
+    return len(t) > 1 and not np.any(t % 1.0) and float(np.median(np.diff(t))) == 1.0
 
 
 def _repeats(t: Array) -> bool:

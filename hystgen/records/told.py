@@ -23,5 +23,6 @@ def time_without_unit(records: Sequence[Record], given: float | None) -> str:
     names = ", ".join(each.name for each in slow[:3]) + (f" and {len(slow) - 3} more" if len(slow) > 3 else "")
     return (
         f"{names}: t has no unit and was read in seconds, with a step of {duration(first.sample_time)} and "
-        f"{float(first.t[-1] - first.t[0]):.4g} s in all; if it is in ms, write the unit after its name, t [ms]"
+        f"{float(first.t[-1] - first.t[0]):.4g} s in all; if it is in ms, write the unit after its name, in the file "
+        'or with --columns "t=t [ms]"; if it counts samples, give --sample-time'
     )

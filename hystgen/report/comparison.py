@@ -137,12 +137,10 @@ def html(found: Comparison) -> str:
 
 
 def _next_step(found: Comparison) -> list[Text]:
-    """What to do with the closest model."""
-    best = found.models[0]
-    if not best.rms < found.line.rms:
-        return []
-    name = best.name if best.name.endswith((".yaml", ".yml")) else "params.yaml"
-    return [Text("Your next step: write the compensator as C.", f"hystgen emit {name} -o firmware/")]
+    """What to do with the closest model, and why a model has no C yet."""
+    why = [Text(f"{each.name} has no C yet: {each.refused}.") for each in found.models if each.refused]
+    step, command = found.next_step()
+    return [*why, *([Text(f"Your next step: {step}.", command)] if step else [])]
 
 
 def _zoom(found: Comparison) -> Viewer:

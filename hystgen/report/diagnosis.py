@@ -65,7 +65,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     }
     sections = [
         Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
-        Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
+        Section("What was found", _found(found)),
         Section("Settling", [Text(f"The output of the model with the effects is {settling(found.model)}.")]),
         Section("Remaining error", _left(result)),
         Section("Faults of the data", _faults(result)),
@@ -142,8 +142,9 @@ def _noise(result: Result) -> Text:
     return Text(f"The {floor}, from {NOISE_FROM[result.noise_from]}.")
 
 
-def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | HtmlTable]:
-    """The effects found. `not_emitted`: why their compensators cannot be emitted as C; empty if they can."""
+def _found(found: Diagnosis) -> list[Text | HtmlTable]:
+    """The effects found, and what they mean for a compensator."""
+    result, there, not_emitted = found.result, found.parameters.model.effects, found.not_emitted()
     if not result.effects:
         return [Text("No effect in the catalogue removes enough of the held-out error to be named.")]
     unit = result.unit
@@ -154,7 +155,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         before, after = effect.holdout_before, effect.holdout_after
         share = f"{round(100.0 * effect.share_of_gap)} %"
         named_by = "the search" if not effect.known else "you; the records support it" if effect.unsupported is None \
-            else f"you; the records do not support it: {effect.unsupported}"
+            else f"you; {found.not_supported(effect)}"
         rows.append([effect.name, f"{before:.4g}", f"{after:.4g}", share, _chance(effect.p_value), named_by])
         kind = _kind(effect, there)
         how = (kind.compensated, kind.compensation) if kind is not None else FRONT
@@ -168,7 +169,9 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text("What they mean for a compensator:"),
         HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
-        else Text("Error of the motion with the compensator:", "hystgen track params.yaml RECORDS -o tracking/"),
+        else Text(
+            "Error of the motion with the compensator:", f"hystgen track params.yaml {found.judged_by()} -o tracking/"
+        ),
         Text(
             "Their parameters. The intervals account for correlated residuals and for free weights, but not for other "
             "shapes that may fit as well:"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property, partial
@@ -294,16 +295,25 @@ class Diagnosis:
             parts.append(f"The data have faults: {wrong}")
         return " ".join(f"{part}." for part in parts)
 
-    def next_step(self) -> tuple[str, str]:
-        """The next step, and its command."""
+    def next_step(
+        self, file: str = "params.yaml", records: str = "", held: str = ""
+    ) -> tuple[str, str]:
+        """The next step, and its command; `file`: the model's, `records`: all records, `held`: those to judge by, with
+        the options that read them, all as typed; by default the names of the records."""
+        every = " ".join(dict.fromkeys(shlex.quote(each.name) for each in self.signals))
+        records, held = records or every, held or self.judged_by()
         if self._of_another_kind() and not self.result.effects:
-            fit = "hystgen identify RECORDS --model auto -o auto.yaml"
+            fit = f"hystgen identify {records} --model auto -o auto.yaml"
             return "fit elements whose minor loops stay open, which auto tries", fit
         if self._limits() or (self.verdict == "unexplained" and not self.result.effects):
-            return "record drives in which every effect shows", "hystgen diagnose --plan params.yaml -o plan/"
+            return "record drives in which every effect shows", f"hystgen diagnose --plan {file} -o plan/"
         if self.not_emitted():
-            return "see the tracking error with the model", "hystgen track params.yaml RECORDS -o tracking/"
-        return "write the compensator as C", "hystgen emit params.yaml -o firmware/"
+            return "see the tracking error with the model", f"hystgen track {file} {held} -o tracking/"
+        return "write the compensator as C", f"hystgen emit {file} -o firmware/"
+
+    def judged_by(self) -> str:
+        """The names of the held-out records, or of all if none was held out as a whole, as typed."""
+        return " ".join(dict.fromkeys(shlex.quote(e.name) for e in self.signals if e.held_out)) or "RECORDS"
 
     def uncertain(self) -> list[str]:
         """Parameters at an end of their range, and effects with two parts that coincide."""
@@ -335,13 +345,19 @@ class Diagnosis:
         for each in self.result.effects:
             if not each.known:
                 continue
-            gain = f"from {self._rms(each.holdout_before)} to {self._rms(each.holdout_after)}, p = {each.p_value:.1g}"
+            gain = f"from {self._rms(each.holdout_before)} to {self._rms(each.holdout_after)}"
             if each.unsupported is None:
+                gain += f", p = {each.p_value:.1g}"
                 said.append(f"You named {each.name}, and the records support it: held-out rms error {gain}")
             else:
-                why = f"{each.unsupported} (held-out rms error {gain})"
-                said.append(f"You named {each.name}, so it is written, but the records do not support it: {why}")
+                why = f"{self.not_supported(each)} (when it was added, held-out rms error {gain})"
+                said.append(f"You named {each.name}, so it is written, but {why}")
         return said
+
+    def not_supported(self, effect: NamedEffect) -> str:
+        """Why the records do not support an effect that the user named; it is judged with all others in place."""
+        beside = "beside the other effects, " if len(self.result.effects) > 1 else ""
+        return f"the records do not support it: {beside}{effect.unsupported}"
 
     @property
     def _harmful(self) -> str:
