@@ -154,7 +154,18 @@ class ChainTables(NamedTuple):
     @property
     def calls(self) -> set[str]:
         """The calls that the chain's blocks add to the interface."""
-        return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
+        here = [part for part in PARTS if self.number_of(part.name)]
+        return {call for part in here for call in (*part.calls, *part.told(self.of(part.name)))}
+
+    @property
+    def columns(self) -> Any:
+        """The tables of the gains that follow a column."""
+        return self.of("gain")
+
+    @property
+    def influences(self) -> int:
+        """Number of columns that `set_influence` sets."""
+        return int(np.max(self.columns.entry, initial=-1)) + 1
 
     @property
     def braked(self) -> bool:
