@@ -109,6 +109,20 @@ def _mains(frequency: float, width: float) -> float | str | None:
     return None
 
 
+def mains(items: Sequence[Item], values: Sequence[Array]) -> list[float]:
+    """Frequencies in Hz of the mains lines in signals of the records, at most one for each harmonic looked for."""
+    found: list[float] = []
+    if not all(item.timed for item in items):
+        return found
+    for _ in MAINS_HARMONICS:
+        line = in_time(items, values)
+        if line is None or not isinstance(line.finding, Line) or line.finding.mains is None:
+            break
+        found.append(line.finding.frequency)
+        values = line.errors
+    return found
+
+
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     """The strongest line, if in most of the records that show it, each half predicts the line in the other.
 

@@ -133,6 +133,8 @@ REFUSALS = {
     "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
     "grows": "with a time constant of {value:.3g} s it only grows during {limit:.3g} s of records, as disturbances can",
+    "shared": "only {value:.0%} of what it removes belongs to the column alone, the rest to what the column shares with "
+    "time, mains or the drive; a name needs {limit:.0%}",
     "range": "{value:.0%} of the gap above the noise remains; with a parameter at an end of its range, "
     "at most {limit:.0%} may",
     "forgets": "hysteresis other than a play sum explains the error at least as well: {value:.3g}{unit} rms remains",

@@ -60,7 +60,9 @@ with warnings.catch_warnings():
         curve: Annotated[tuple[Number, ...], Field(max_length=MOST_CURVED)] = Field(
             default=(), description="offset per x^2, then per x^3, output units per column unit^2, ^3"
         )
-        plays: ColumnPlays | None = Field(default=None, description="plays of x, for another axis's drive")
+        plays: ColumnPlays | None = Field(  # type: ignore[assignment]
+            default=None, description="plays of x, for another axis's drive"
+        )
         range: tuple[Number, Number] | None = Field(
             default=None, description="least and largest value of the column that was fitted, column units"
         )
