@@ -444,10 +444,7 @@ class EmittedModel:
     @property
     def columns(self) -> tuple[str, ...]:
         """The columns that `set_influence` sets, by index."""
-        if self.compiled is None:
-            return ()
-        pairs = zip(self.compiled.parts.blocks["gain"], self.compiled.tables.columns.entry.tolist(), strict=True)
-        return tuple(column for effect, entry in pairs if entry >= 0 for column in effect.read)
+        return tuple(column for column, *_ in self.compiled.columns) if self.compiled else ()
 
     @cached_property
     def measured(self) -> Measured | None:

@@ -266,6 +266,13 @@ class Compiled:
     """only in fixed point"""
 
     @property
+    def columns(self) -> list[tuple[str, int, float]]:
+        """The columns that `set_influence` sets: name, index, and the number to set per unit of the column."""
+        t = self.tables.columns
+        rows = zip(self.parts.blocks["gain"], t.entry.tolist(), t.unit.tolist(), strict=True)
+        return [(column, entry, unit) for effect, entry, unit in rows if entry >= 0 for column in effect.read]
+
+    @property
     def largest_step(self) -> float:
         """Largest move of the drive per step for which the bounds hold."""
         low, high = self.static.input_range

@@ -705,6 +705,7 @@ SHARED_LAGS = (0.003, 0.02, 0.1)
 """[fractions of a record] Time constants of averages of the drive that a column may share with the output, as a monitor
 of the drive or of its current does. Set by: benchmarks/influences.py."""
 
-OWN_SHARE = 0.25
+OWN_SHARE = 0.08
 """[fraction of the removed power] A column is named only if at least this much of what it removes belongs to it alone,
-apart from time, mains and drive. Set by: benchmarks/influences.py."""
+apart from time, mains and drive: 0.14 and more for the other axis of `examples/xy_stage`, at most 0.03 for a column
+that shares its drift with the output. Set by: benchmarks/influences.py."""

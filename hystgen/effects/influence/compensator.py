@@ -26,7 +26,7 @@ from hystgen.basics.structures import (
     note,
 )
 from hystgen.effects.base import Effect, Place, decays
-from hystgen.effects.columns import TEMPERATURE, Follower, Law
+from hystgen.effects.columns import Follower, Law
 from hystgen.effects.gains import (
     FLOATING,
     LARGEST_GAIN,
@@ -205,8 +205,6 @@ class Followed(One):
     """The block of an effect that follows a column."""
 
     effect: Follower
-    seconds: float
-    entry: int = -1
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
         """Properties of the gain, and roundings of the column on its way to the offset.
@@ -215,7 +213,7 @@ class Followed(One):
         and loses that error again at the rate at which it moves; two coefficients are rounded as well.
         """
         law, wide = self.effect.law, limited(self.effect.law, output)
-        if law.plain and law.column == TEMPERATURE:
+        if self.effect.columns:  # the temperature
             return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
         reach = min(wide.reach, 1e6)
         column = u * (abs(law.reference) + (17.0 if law.time_constant else 1.0) * reach)
@@ -238,9 +236,8 @@ def entries(blocks: Sequence[Followed]) -> Counts:
     count = 0
     found = []
     for one in blocks:
-        own = "temperature" if one.effect.columns else ""
-        found.append(-1 if own else count)
-        count += not own
+        found.append(-1 if one.effect.columns else count)
+        count += not one.effect.columns
     return np.array(found, dtype=np.int64)
 
 
@@ -392,7 +389,7 @@ ARITHMETIC = Realized(
 
 PART = ChainPart(
     "gain", "a column", Place.GAIN, lambda effect: isinstance(effect, Follower),
-    lambda effect, seconds, _: Followed(effect, seconds), ARITHMETIC, late("influence"),
+    lambda effect, *_: Followed(effect), ARITHMETIC, late("influence"),
     problems=problems, code=("gain",), told=calls,
 )
 

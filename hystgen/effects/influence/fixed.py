@@ -11,7 +11,6 @@ import numpy as np
 from hystgen.arithmetic.factors import factor
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import firsts
-from hystgen.effects.columns import TEMPERATURE
 from hystgen.effects.gains import (
     FACTOR_ERROR,
     FIXED,
@@ -74,7 +73,7 @@ class GainFormats(Coded):
 def formats(one: Followed, about: FixedSurroundings, *_: float) -> GainFormats:
     """A gain of a model."""
     wide = limited(one.effect.law, about.span)
-    if wide.law.column == TEMPERATURE:
+    if one.effect.columns:  # the temperature
         code, whole = about.temperature, TEMPERATURE_BITS
         degrees = about.code_max / 2.0**code
         wide = Limited(wide.law, *(min(max(end, -degrees), degrees) for end in (wide.lowest, wide.highest)))

@@ -20,9 +20,9 @@ MOST_CURVED = 2
 MOST_PLAYS = 64
 """Maximum number of plays of a column: a compensator moves all of them in one call."""
 
-SHARES = (0.05, 0.15, 0.35)
-"""[fraction of the column's range] Thresholds of the plays that a fit tries: loops of less than a tenth of the range
-look like noise of the column, and a play of half the range never moves."""
+SHARES = (0.03, 0.07, 0.13, 0.22, 0.35)
+"""[fraction of the column's range] Thresholds of the plays that a fit tries: a smaller one hardly differs from the
+column itself, and a play of half the range never moves."""
 
 
 class ColumnPlays(BaseModel):
@@ -72,7 +72,7 @@ with warnings.catch_warnings():
             """What the column does."""
             moved = self.plays
             return Law(
-                self.column, self.gain, self.offset, self.reference, self.time_constant, self.curve,  # type: ignore[arg-type]
+                self.column, self.gain, self.offset, self.reference, self.time_constant, self.curve,
                 moved.thresholds if moved else (), moved.weights if moved else (),
                 *([self.range] if self.range else []),
             )
@@ -108,6 +108,7 @@ def _of_column(kind: type[Influence], column: str, ends: tuple[float, float], ab
         return
     own, of_gain = 0.01 * about.output_range / half, 0.01 / half
     thresholds = tuple(2.0 * share * half for share in SHARES)
+    rest = min(max(0.0, ends[0]), ends[1])  # another axis begins at rest where its drive is 0
 
     def one(what: str, keys: tuple[str, ...], beyond: str = "") -> Candidate:
         """Amounts of these keys; `lag` is the logarithm of a time constant."""
@@ -116,7 +117,8 @@ def _of_column(kind: type[Influence], column: str, ends: tuple[float, float], ab
             numbers = dict(zip(keys, x.tolist(), strict=True))
             weights = tuple(own * numbers.get(f"play {i}", 0.0) for i in range(len(thresholds)))
             return kind.model_validate({
-                "name": "influence", "column": column, "reference": middle, "range": ends,
+                "name": "influence", "column": column, "range": ends,
+                "reference": rest if "play 0" in numbers else middle,
                 "offset": own * numbers.get("offset", 0.0), "gain": of_gain * numbers.get("gain", 0.0),
                 "time_constant": 10.0 ** numbers["lag"] if "lag" in numbers else 0.0,
                 "curve": (own / half * numbers["square"],) if "square" in numbers else (),
