@@ -67,7 +67,7 @@ def operators(one: EmittedModel) -> list[Operator]:
     columns = min(len(one.columns), LETTERED)
     for name in one.options.operators:
         calls = set(one.calls.get(name, ())).difference(wide)
-        own = list(settings(calls, columns))
+        own = list(settings(calls, columns)) if calls else []
         lettered = [(_letter(code, call), call, more) for code, call, more in own]
         found.append(Operator(name, lettered, _samples(one, name == "inverse", own)))
     return found
