@@ -1,5 +1,6 @@
-/* Gain and offset after the plays that follow a column behind a lag, along a curve, or with plays of
-   it. Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* Gain and offset after the plays that follow a column behind a lag, along a curve, or with plays
+   of it. Called by the functions that emission writes for a chain, see
+   compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #include "effects/influence/gain.c"
 
@@ -74,10 +75,11 @@ static bool hystgen_course_set(const hystgen_gain_table_t *line, hystgen_gain_t 
 }
 
 /* A sample has passed: the lag moves on. */
-HYSTGEN_APART_IN_FIXED_BLOCK void
-hystgen_course_tick(const hystgen_gain_table_t *line, hystgen_gain_t *gain,
-                    const hystgen_course_table_t *t, hystgen_course_t *self,
-                    hystgen_course_state_t *state) {
+HYSTGEN_APART_IN_FIXED_BLOCK void hystgen_course_tick(const hystgen_gain_table_t *line,
+                                                      hystgen_gain_t *gain,
+                                                      const hystgen_course_table_t *t,
+                                                      hystgen_course_t *self,
+                                                      hystgen_course_state_t *state) {
     if (self->begun) {
         const hystgen_signal_t seen = self->seen;
         const hystgen_signal_t high = self->high;

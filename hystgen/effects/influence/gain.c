@@ -1,5 +1,5 @@
-/* Gain and offset after the plays, set by the value of a column: at once and along a line. Called by
-   the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* Gain and offset after the plays, set by the value of a column, at once and along a line. Called
+   by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_INFLUENCE_GAIN_C
 #define HYSTGEN_INFLUENCE_GAIN_C
 #include "compensator/chain/model.h"
