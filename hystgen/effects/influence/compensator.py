@@ -141,7 +141,7 @@ class GainMemory(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Limited:
+class LimitedLaw:
     """A law between two values of its column: the largest `reach` above or below the reference, and the largest slope
     of the offset there."""
 
@@ -176,7 +176,7 @@ class Limited:
         return abs(self.law.gain) * way / LEAST_GAIN if self.law.time_constant else 0.0
 
 
-def limited(law: Law, span: float) -> Limited:
+def limited(law: Law, span: float) -> LimitedLaw:
     """A law between the values of its column up to which the gain stays within its limits, and the offset within the
     `span` of the output."""
     ends = [math.inf]
@@ -197,7 +197,7 @@ def limited(law: Law, span: float) -> Limited:
     down = max((end for end in ends if end < 0.0), default=-math.inf)
     largest = 1e6  # units; if the column has no effect
     lowest, highest = law.reference + max(down, -largest), law.reference + min(up, largest)
-    return Limited(law, max(lowest, law.ends[0]), min(highest, law.ends[1]))
+    return LimitedLaw(law, max(lowest, law.ends[0]), min(highest, law.ends[1]))
 
 
 @dataclass(frozen=True)

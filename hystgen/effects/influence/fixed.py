@@ -29,7 +29,7 @@ from hystgen.effects.influence.compensator import (
     Followed,
     GainTable,
     GainTables,
-    Limited,
+    LimitedLaw,
     limited,
 )
 from hystgen.effects.kinds import numbered
@@ -47,7 +47,7 @@ class GainFormats(Coded):
     """A gain: its law, the fraction bits of the column's codes and of its internal value, and of signals."""
 
     one: Followed
-    wide: Limited
+    wide: LimitedLaw
     code: int
     whole: int
     signal: int
@@ -76,7 +76,7 @@ def formats(one: Followed, about: FixedSurroundings, *_: float) -> GainFormats:
     if one.effect.columns:  # the temperature
         code, whole = about.temperature, TEMPERATURE_BITS
         degrees = about.code_max / 2.0**code
-        wide = Limited(wide.law, *(min(max(end, -degrees), degrees) for end in (wide.lowest, wide.highest)))
+        wide = LimitedLaw(wide.law, *(min(max(end, -degrees), degrees) for end in (wide.lowest, wide.highest)))
     else:
         farthest = max(abs(wide.lowest), abs(wide.highest))
         code = math.floor(math.log2(about.code_max / farthest))

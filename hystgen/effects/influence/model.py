@@ -111,7 +111,7 @@ def _of_column(kind: type[Influence], column: str, ends: tuple[float, float], ab
     rest = min(max(0.0, ends[0]), ends[1])  # another axis begins at rest where its drive is 0
 
     def one(what: str, keys: tuple[str, ...], beyond: str = "") -> Candidate:
-        """Amounts of these keys; `lag` is the logarithm of a time constant."""
+        """Amounts of these keys; `late` is the logarithm of a time constant."""
 
         def build(x: Array) -> Influence:
             numbers = dict(zip(keys, x.tolist(), strict=True))
@@ -120,16 +120,16 @@ def _of_column(kind: type[Influence], column: str, ends: tuple[float, float], ab
                 "name": "influence", "column": column, "range": ends,
                 "reference": rest if "play 0" in numbers else middle,
                 "offset": own * numbers.get("offset", 0.0), "gain": of_gain * numbers.get("gain", 0.0),
-                "time_constant": 10.0 ** numbers["lag"] if "lag" in numbers else 0.0,
+                "time_constant": 10.0 ** numbers["late"] if "late" in numbers else 0.0,
                 "curve": (own / half * numbers["square"],) if "square" in numbers else (),
                 "plays": {"thresholds": thresholds, "weights": weights} if "play 0" in numbers else None,
             })
 
-        low, high = (np.array([limit if key == "lag" else way * MOST for key in keys]) for way, limit in
+        low, high = (np.array([limit if key == "late" else way * MOST for key in keys]) for way, limit in
                      zip((-1.0, 1.0), lags, strict=True))
-        starts = [np.array([lag if key == "lag" else 0.0 for key in keys]) for lag in
-                  (lags[0] + share * (lags[1] - lags[0]) for share in ((0.5, 0.8, 0.2) if "lag" in keys else (0.5,)))]
-        amounts = tuple(i for i, key in enumerate(keys) if key != "lag") if "lag" in keys else ()
+        starts = [np.array([lag if key == "late" else 0.0 for key in keys]) for lag in
+                  (lags[0] + share * (lags[1] - lags[0]) for share in ((0.5, 0.8, 0.2) if "late" in keys else (0.5,)))]
+        amounts = tuple(i for i, key in enumerate(keys) if key != "late") if "late" in keys else ()
         return Candidate(
             f"influence of {column}, {what}", low, high, starts[0], build, starts[0], tuple(starts[1:]),
             beyond and f"influence of {column}, {beyond}", amounts=amounts,
@@ -140,8 +140,8 @@ def _of_column(kind: type[Influence], column: str, ends: tuple[float, float], ab
     yield one("gain", ("gain",))
     yield one("gain and offset", ("offset", "gain"))
     if about.timed:
-        yield one("offset behind a lag", ("lag", "offset"))
-        yield one("gain behind a lag", ("lag", "gain"))
+        yield one("offset behind a lag", ("late", "offset"))
+        yield one("gain behind a lag", ("late", "gain"))
     yield one("offset along a curve", ("offset", "square"), "offset")
     yield one("offset and plays", ("offset", *(f"play {i}" for i in range(len(thresholds)))), "offset")
 
