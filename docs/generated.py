@@ -45,7 +45,8 @@ MODELS = {
     {name: lag, time_constant: 2.0e-4}, {name: delay, time: 1.0e-4}, {name: slew_limit, rate: 2.0e+4},
     {name: creep, time_constants: [0.1, 1.0], weights: [0.02, 0.01]},
     {name: ageing, shape: logarithmic, loss: 0.01, travel: 1.0e+4},
-    {name: thermal, source: logged, gain_per_degree: 0.001, offset_per_degree: 0.01, reference: 20}]}
+    {name: thermal, source: logged, gain_per_degree: 0.001, offset_per_degree: 0.01, reference: 20},
+    {name: influence, column: load, offset: 0.01, reference: 5}]}
 """,
 }
 """Parameter files of the headers shown: one with plays alone, and one whose effects need every call."""

@@ -403,4 +403,23 @@ class CompiledC(_InUnits):
 
         model = as_model(source)
         options = _one_operator(model, operator, arithmetic, engine)
-        super().__init__(CompiledInstance(model, options, compiler), model, options)
+        instance = CompiledInstance(model, options, compiler)
+        super().__init__(instance, model, options)
+        self._instance = instance
+        self._columns: dict[str, list[tuple[int, float]]] = {}
+        if model.effects:
+            for column, entry, unit in model.compiled(options.arithmetic, options.engine).columns:
+                self._columns.setdefault(column, []).append((entry, unit))
+        self._whole = options.arithmetic in FIXED
+
+    def set_influence(self, column: str, value: float) -> None:
+        """Set a logged column that the model follows, in its own unit, from the next sample on. Raises ValueError for
+        a column that the model does not follow."""
+        if column not in self._columns:
+            known = ", ".join(self._columns) or "none"
+            raise ValueError(f"the model follows no column {column!r}; it follows {known}")
+        for entry, unit in self._columns[column]:
+            given = value * unit
+            if self._whole and math.isfinite(given):
+                given = fixed_tables.nearest(min(max(given, -self._most - 1.0), float(self._most)))
+            self._instance.set_influence(entry, given)

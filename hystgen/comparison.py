@@ -359,7 +359,8 @@ def _deviation(name: str, model: Model, items: Sequence[Item], factor: float) ->
     """The deviations of a model from the items, times `factor`. Raises EffectsError, naming the model."""
     try:
         model.chain.require_columns([item.run for item in items])
-        untimed = [effect.name for effect in model.effects if effect.timed and not all(each.timed for each in items)]
+        timed = all(each.timed for each in items)
+        untimed = [effect.name for effect in model.effects if effect.needs_time and not timed]
         if untimed:
             raise EffectsError(f"{untimed[0]} needs time, and not every record has one; give --sample-time")
         fitted = selection.as_given(model.cascade, model.effects)

@@ -457,8 +457,8 @@ class Model:
         drive = np.array(arguments.signal("v", v), dtype=np.float64)
         low, high = self.cascade.input_range
         period = self.parameters.sample_time or 1.0
-        if t is None and self.parameters.sample_time is None and any(effect.timed for effect in self.effects):
-            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.timed))
+        if t is None and self.parameters.sample_time is None and any(effect.needs_time for effect in self.effects):
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.needs_time))
             raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
         times = np.array(np.arange(len(drive)) * period if t is None else arguments.signal("t", t), dtype=np.float64)
         if not isinstance(extra or {}, Mapping):

@@ -18,7 +18,7 @@ from modelfiles import CHAINS, FILES, LED, NOTCHED
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.emission import module
-from hystgen.emission.chain import SETTINGS as SETTING_CALLS
+from hystgen.emission.chain import settings as settings_of
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -31,7 +31,7 @@ CALLS = {
     "reset": slots.OP_RESET,
     "commit": slots.OP_COMMIT,
 }
-SETTINGS = ("push", "settle", "set_offset", "set_temperature", "set_gain")
+SETTINGS = ("push", "settle", "set_offset", "set_temperature", "set_gain", "set_influence")
 """Calls of models with effects that are fuzzed with arbitrary arguments."""
 
 SANITIZERS = "address,undefined,float-cast-overflow"
@@ -180,11 +180,11 @@ def build(
     return Target(model, arithmetic, engine, binary)
 
 
-def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple[int, str]]]:
-    """Codes and names of each operator's settings."""
-    calls = module.of(model, Options("both", arithmetic, engine, "self-contained")).compensator.calls
+def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple[int, str, str]]]:
+    """Codes and names of each operator's settings, and the arguments before the number."""
+    one = module.of(model, Options("both", arithmetic, engine, "self-contained")).compensator
     return {
-        op: [(SETTING_CALLS[each], each) for each in SETTINGS if each in calls.get(op, ())]
+        op: list(settings_of(set(SETTINGS).intersection(one.calls.get(op, ())), len(one.columns)))
         for op in ("forward", "inverse")
     }
 

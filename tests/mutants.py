@@ -387,10 +387,10 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("friction begins anew in every sample", "effects/thermal/friction.c", "self->begun = true;",
      "self->begun = false;", "rubbed", "float32"),
     ("all plays rub alike, fixed", "effects/thermal/friction.c", "        odd += 2;\n", "", "rubbed", "q31"),
-    ("a temperature moves no offset", "effects/thermal/gain.c",
-     "self->offset = hystgen_times(above, &t->offset_per_degree);", "self->offset = 0 * above;", "warm", "float32"),
-    ("a limited temperature is not told", "effects/thermal/gain.c", "inside < given ||",
-     "inside < t->coldest ||", "warm", "float32"),
+    ("a temperature moves no offset", "effects/influence/gain.c",
+     "self->offset = hystgen_times(above, &t->offset_per_unit);", "self->offset = 0 * above;", "warm", "float32"),
+    ("a limited temperature is not told", "effects/influence/gain.c", "*limited = inside < given ||",
+     "*limited = inside < t->lowest ||", "warm", "float32"),
     ("a gain is followed with one Newton step less", "effects/gains.c", "i < turns; ++i",
      "i + 1u < turns; ++i", "heated", "q31"),
     ("heat loses the remainder", "effects/thermal/heat.c", "self->low = change - (warm - high);",
@@ -603,8 +603,8 @@ EQUIVALENT = (
              "        change = next - high;\n", "", "worn", "float32"),
     # The temperature is already limited to the range in which the gain is inside its limits.
     _of_loop(
-        "a limited gain is not told", "effects/thermal/gain.c",
-        "return self->gain < wanted || self->gain > wanted || inside", "return inside", "warm", "float32",
+        "a limited gain is not told", "effects/influence/gain.c",
+        "return self->gain < wanted || self->gain > wanted;", "return false;", "warm", "float32",
     ),
     # The direction is found before it is first used.
     _of_loop("a lag at rest falls", "effects/lag/steady.c",

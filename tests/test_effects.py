@@ -64,6 +64,8 @@ EVERY = [
     make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
     make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
     make("thermal", source="hysteresis", gain_per_degree=0.01, time_constant=2.0, heating=0.2, reach=1.0),
+    make("influence", column="load", offset=0.02, gain=0.01, reference=1.0, time_constant=0.1, curve=(0.01, -0.002),
+         plays={"thresholds": (0.0, 0.5), "weights": (0.01, 0.02)}),
     make("drift", rate=0.5),
     make("drift", shape="curved", rate=0.5, change=-0.1),
     make("ageing", loss=0.1, travel=20.0),
@@ -116,7 +118,7 @@ def rounding(steps: int, size: float) -> float:
 
 
 def record(t: Array, v: Array) -> Run:
-    return Run(t, v, {"temperature": 20.0 + 3.0 * np.sin(t)})
+    return Run(t, v, {"temperature": 20.0 + 3.0 * np.sin(t), "load": 1.5 * np.cos(9.0 * t)})
 
 
 def of(effect: Effect, t: Array, v: Array) -> Array:
@@ -197,7 +199,7 @@ def test_a_record_in_pieces_is_the_record(effect: Effect) -> None:
         whole = record(t, v)
         cuts = (0, 317, 318, 900, len(t))
         parts = [
-            Run(t[a:b], v[a:b], {"temperature": whole.extra["temperature"][a:b]})
+            Run(t[a:b], v[a:b], {name: column[a:b] for name, column in whole.extra.items()})
             for a, b in itertools.pairwise(cuts)
         ]
         assert np.array_equal(np.concatenate(chain.simulate(parts)), chain.simulate([whole])[0])
@@ -250,8 +252,10 @@ def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
 def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
     t, v = drive(400)
     speed, travel = np.max(np.abs(np.diff(v) / np.diff(t))), np.sum(np.abs(np.diff(v)))
-    columns = frozenset({"temperature"})
-    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), columns, output=(-5.0, 3.0))
+    columns, ends = frozenset({"temperature", "load"}), {"load": (-1.5, 1.5)}
+    about = About(
+        (-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), columns, ends, output=(-5.0, 3.0)
+    )
     rng = np.random.default_rng(5)
     found = type(effect).candidates(about)
     assert found
@@ -340,6 +344,13 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
         st.builds(
             lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m}, times, st.floats(0.1, 10.0)
         ),
+    ),
+    "influence": st.builds(
+        lambda o, g, tau, c, r: {
+            "column": "load", "offset": o, "gain": g, "time_constant": tau, "curve": (c,),
+            "plays": {"thresholds": (r,), "weights": (o,)},
+        },
+        share, share, times, share, positive,
     ),
     "resonance": st.builds(lambda f, z: {"frequency": f, "damping": z}, positive, st.floats(0, 10, exclude_min=True))
     | st.builds(lambda f, x: {"shape": "part", "frequency": f, "damping": x, "share": x}, positive,

@@ -569,7 +569,7 @@ REFUSED = [
         '4:69: model.effects[0].name: unknown effect creap; did you mean creep?',
     ]),
     case('effect_unknown', eff("[{name: zzz}]"), [
-        '4:69: model.effects[0].name: unknown effect zzz; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent, bouc_wen',
+        '4:69: model.effects[0].name: unknown effect zzz; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, influence, drift, ageing, sensor_nonlinearity, noncongruent, bouc_wen',
     ]),
     case('effect_user', eff("[{name: 'user:x'}]"), [
         '4:69: model.effects[0].name: user:x is not defined in any given file; give its file (--effects)',
@@ -580,7 +580,7 @@ REFUSED = [
     case('effect_forms', eff("[creep, {}, {name: 5}, {name: }, null]"), [
         '4:62: model.effects[0]: must be an effect with its name, not the text "creep"; write {name: ..}',
         '4:69: model.effects[1].name: is missing; add the name of an effect',
-        '4:80: model.effects[2].name: must name an effect, not 5; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent, bouc_wen',
+        '4:80: model.effects[2].name: must name an effect, not 5; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, influence, drift, ageing, sensor_nonlinearity, noncongruent, bouc_wen',
         '4:85: model.effects[3].name: has no value; write one, or remove it',
         '4:94: model.effects[4]: has no value; write one, or remove it',
     ]),

@@ -226,9 +226,9 @@ class Chain(Ordered):
 
     def require_columns(self, runs: Sequence[Run]) -> None:
         """Raise EffectsError if a run lacks a column that an effect needs."""
-        for name in sorted({column for effect in self.effects for column in effect.columns}):
+        for name in sorted({column for effect in self.effects for column in effect.read}):
             if any(name not in run.extra for run in runs):
-                who = next(effect.name for effect in self.effects if name in effect.columns)
+                who = next(effect.name for effect in self.effects if name in effect.read)
                 raise EffectsError(f"the effect {who} needs the column {name}, which a record lacks")
 
     def simulate(self, runs: Sequence[Run], history: Sequence[float] | None = None) -> list[Array]:
@@ -251,7 +251,8 @@ class Chain(Ordered):
         for effect in self.filters:
             y = effect.filtered(y, run)
         for effect in self.at(Place.GAIN):
-            y = effect.gain(run) * y + effect.offset(run)
+            gain, offset = effect.gains(run)
+            y = gain * y + offset
         for effect in self.at(Place.LINEAR)[len(self.filters) :]:
             y = effect.filtered(y, run)
         return self.mapped(y, self.cascade.output_offset, run) + self.added(run)

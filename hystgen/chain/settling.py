@@ -106,7 +106,7 @@ def settling(chain: Chain, within: float) -> Settling:
     Before the step, the drive has swept the range and come back, and everything is at rest. Effects that are added to
     the output, or that follow a column of the record, do not respond to the drive and are left out.
     """
-    answering = [effect for effect in chain.effects if effect.place is not Place.ADDED and not effect.columns]
+    answering = [effect for effect in chain.effects if effect.place is not Place.ADDED and not effect.read]
     left_out = tuple(dict.fromkeys(effect.name for effect in chain.effects if effect not in answering))
     low, high = chain.cascade.input_range
 
@@ -115,7 +115,7 @@ def settling(chain: Chain, within: float) -> Settling:
         return _Answer.of(moved, low, high, within), _Answer.of(moved, high, low, within)
 
     up, down = both(answering)
-    names = tuple(dict.fromkeys(effect.name for effect in answering if effect.timed))
+    names = tuple(dict.fromkeys(effect.name for effect in answering if effect.needs_time))
     seconds = max(up.seconds, down.seconds)
     because = names
     if len(names) > 1 and seconds > 0.0:

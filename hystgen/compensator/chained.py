@@ -314,12 +314,12 @@ class Compensator:
         return min(max(near, low[0]), high[0])
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
-        """Gain and offset (N,) for each logged temperature, at the time at which a sample's drive takes effect."""
+        """Gain and offset (N,) for each logged column, at the time at which a sample's drive takes effect."""
         ahead = reference.t + self.parts.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
-        logged = [effect for effect in self.effects if effect.place is Place.GAIN and effect.columns]
-        return [(effect.gain(later), effect.offset(later)) for effect in logged]
+        logged = [effect for effect in self.effects if effect.place is Place.GAIN and effect.read]
+        return [effect.gains(later) for effect in logged]
 
     def _targets(self, reference: Run, asked: NDArray[np.bool_]) -> Array:
         """The output (N,) that creep, or the gain behind it, has to reach at each sample to follow the reference."""

@@ -109,7 +109,8 @@ def _described(model: Model, fmi: int, operator: str, header: str) -> Descriptio
     given, answer = (drive, displacement) if operator == "forward" else (reference, drive)
     warm = None
     if any(f"{model.name}_{operator}_set_temperature(" in each for each in exports(model.name, header)):
-        degrees = [each for effect in whole.model.effects if (each := getattr(effect, "reference", None)) is not None]
+        warmed = (effect for effect in whole.model.effects if effect.columns)
+        degrees = [each for effect in warmed if (each := getattr(effect, "reference", None)) is not None]
         warm = Signal("temperature", "degC", "temperature of the actuator; until it is set, that of the references",
                       float(degrees[0]) if degrees else 0.0)
     token = _token(fmi, header)

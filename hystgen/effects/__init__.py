@@ -31,6 +31,7 @@ _FIRST = (
     "slew_limit",
     "saturation",
     "thermal",
+    "influence",
     "drift",
     "ageing",
     "sensor_nonlinearity",

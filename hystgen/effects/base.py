@@ -148,6 +148,8 @@ class About:
     thresholds: tuple[float, ...]
     columns: frozenset[str] = frozenset()
     """further columns that every record has"""
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """smallest and largest value of each of them"""
     ringing: tuple[float, ...] = ()
     """frequencies in Hz at which the error so far has narrow peaks, strongest first"""
     timed: bool = True
@@ -241,7 +243,7 @@ class Effect(BaseModel):
     slews: ClassVar[bool] = False
     """whether it limits the rate of the drive, to its parameters `rate` and `falling_rate`"""
     columns: ClassVar[tuple[str, ...]] = ()
-    """further columns that a record needs"""
+    """further columns that every effect of this class needs"""
     fades: ClassVar[bool] = False
     """whether a pause before a record with a known history brings its start state to rest"""
     settled: ClassVar[tuple[str, ...]] = ()
@@ -274,6 +276,16 @@ class Effect(BaseModel):
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
             guarded.guard(cls, Effect, str(words[0]))
+
+    @property
+    def read(self) -> tuple[str, ...]:
+        """Further columns that a record needs for this effect."""
+        return self.columns
+
+    @property
+    def needs_time(self) -> bool:
+        """Whether the times of the samples matter to this effect."""
+        return self.timed
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """Contradictions between parameters, as (keys, message); `thresholds`: of the model, None if unknown."""
@@ -361,6 +373,10 @@ class Effect(BaseModel):
     def offset(self, run: Run) -> Array:
         """GAIN: added after the factor (N,)."""
         return np.zeros(len(run.t))
+
+    def gains(self, run: Run) -> tuple[Array, Array]:
+        """GAIN: factor and offset (N,) together."""
+        return self.gain(run), self.offset(run)
 
     def mapped(self, y: Array, run: Run) -> Array:
         """OUTPUT: the output (N,) behind the effect."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple, Protocol
 
-from hystgen.arithmetic.factors import multiplied, times
+from hystgen.arithmetic.factors import MANTISSA_BITS, multiplied, times
 from hystgen.basics.jit import Action, Answer, Scalar, jit, zero
 from hystgen.basics.structures import Factor, Literal, NumberArray, Struct, TwoParts
+from hystgen.effects.part import CodedGain, Coding
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 """[times] A gain is kept between these: a gain beyond them that the caller sets is due to a faulty sensor or a wrong
@@ -26,6 +27,24 @@ ONE = 1 << GAIN_BITS
 RECIPROCAL_ERROR = 4.0 * 2.0**-GAIN_BITS
 """[fraction of the signal] Error of the reciprocal of a gain of at least 1/2 that is off by its last bit: twice the
 gain's error, plus that of a Newton step."""
+
+LINEAR_ERROR = 2.0**-GAIN_BITS
+"""[fraction of the signal] Error of a gain that is linear in a temperature or a column: one product."""
+
+FACTOR_ERROR = 2.0**-MANTISSA_BITS
+"""[fraction of a product] Error of a factor: half its last bit. The reference of a column has the same error."""
+
+
+def coded_gain(
+    rates: tuple[float, float], size: float, at: Coding, wrong: float, at_once: float, least: float, largest: float,
+    offset: float,
+) -> CodedGain:
+    """A gain in fixed point that follows a column, with `rates` of gain and offset per unit of it, for inputs up to
+    `size`; the column is off by `wrong` units and changes by `at_once` units per sample."""
+    unit = abs(rates[0]) * size + abs(rates[1]) / at.output_lsb
+    there = wrong * unit + LINEAR_ERROR * size + FACTOR_ERROR * offset
+    back = (wrong + at_once) * unit / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
+    return CodedGain(least, largest, there, back, offset)
 
 
 def too_fast(change: float) -> str:

@@ -69,6 +69,7 @@ class Verbs:
     without `rest`, absorb also settles it, without `resting`, solve also serves at rest.
 
     `reset`: to the parameter file's state; `move`: the drive has moved from one value to another in one sample;
+    `tick`: a sample has passed; `set_column`: as `set_*`, for the column of this index, -1 for the temperature;
     `set_*`: set a number from the caller, and return whether it had to be limited; `travelled`: the travel, from the
     memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag for any but
     the first; `ahead`: addition to the displacement at the newest reference's time, with flags for whether there is a
@@ -82,7 +83,8 @@ class Verbs:
     solve: Answer | None = None
     reset: Action | None = None
     move: Action | None = None
-    set_temperature: Check | None = None
+    set_column: Check | None = None
+    tick: Action | None = None
     set_gain: Check | None = None
     set_travel: Check | None = None
     travelled: Answer | None = None
@@ -328,8 +330,7 @@ class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
     fixed point the tables are made from the `formats` of each block, for its surroundings, largest input and output.
 
-    `kinds`: of its C; `beside`: constants of an additional struct for each block; `degrees`: the temperature, degC, at
-    which its gain holds, from its tables.
+    `kinds`: of its C; `beside`: constants of an additional struct for each block.
     """
 
     verbs: Verbs
@@ -338,7 +339,6 @@ class Realized:
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
     kinds: tuple[BlockKind, ...] = ()
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
-    degrees: Callable[[Any], float] | None = None
 
 
 class Setting(NamedTuple):
@@ -382,8 +382,9 @@ def given(place: Place) -> Callable[[Any], bool]:
 class ChainPart:
     """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether an effect has this
     kind of block; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`:
-    interface calls that it serves; `forward`: only the forward operator has it; `joined`: all its blocks are merged
-    into one in C; `coded`: loads its fixed-point version, for models in fixed point.
+    interface calls that it serves, and `told` those that depend on its tables; `forward`: only the forward operator
+    has it; `joined`: all its blocks are merged into one in C; `coded`: loads its fixed-point version, for models in
+    fixed point.
 
     `longest`: the longest travel that can be set, from its tables; `unreached`: largest error of these tables, as a
     fraction of the output. `problems`: why the C cannot include an effect; `unmeasured`: set if nothing measures it;
@@ -413,6 +414,7 @@ class ChainPart:
     uneven: Callable[..., Block | None] = lambda _: None
     following: Callable[..., Following | None] = lambda _: None
     no_inverse: Callable[..., Iterable[str]] = lambda _: ()
+    told: Callable[[Any], Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

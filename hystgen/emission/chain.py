@@ -4,7 +4,7 @@ The blocks themselves are in `c_runtime/` and in the folders of effects."""
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -49,7 +49,7 @@ class NamedBlock:
         """The fields of its memory."""
         kind, rows = self.kind, self.kind.rows
         found = [Field(f"{kind.name}_t", self.name)]
-        if rows and rows.state:
+        if rows and rows.state and len(self.constants.rows):
             found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", length=str(len(self.constants.rows))))
         return found
 
@@ -76,6 +76,8 @@ class NamedBlock:
         if not kind.rows:
             return [writer.entries(f"{kind.tabled}_table_t", self.name, numbers)]
         rows = [members(kind.rows.table, row) for row in constants.rows]
+        if not rows:
+            return [writer.entries(f"{kind.name}_table_t", self.name, ["NULL", *numbers])]
         of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows)
         return [of_rows, writer.entries(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
 
@@ -105,8 +107,18 @@ SETTINGS = {
     "set_temperature": slots.OP_TEMPERATURE,
     "set_gain": slots.OP_GAIN,
     "set_travel": slots.OP_TRAVEL,
+    "set_influence": slots.OP_INFLUENCE,
 }
 """Calls that take a number and return nothing, which only models with effects have."""
+
+
+def settings(calls: Collection[str], columns: int) -> Iterator[tuple[int, str, str]]:
+    """The settings among `calls`: code, name in C, and arguments before the number, once for each of the columns."""
+    for name, code in SETTINGS.items():
+        if name in calls and name != "set_influence":
+            yield code, name, ""
+        elif name in calls:
+            yield from ((code + i, name, f"{i}u, ") for i in range(columns))
 
 
 def plays(t: ChainTables) -> tuple[str, str]:
@@ -118,35 +130,68 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 
 @dataclass(frozen=True)
+class NamedColumn:
+    """A gain that follows a column: its blocks, and the index of its setting, -1 for the temperature."""
+
+    gain: NamedBlock
+    course: NamedBlock | None
+    entry: int
+
+    @property
+    def late(self) -> bool:
+        """Whether it follows through a lag."""
+        return bool(self.course and self.course.constants.table["lags"])
+
+    @property
+    def memory(self) -> str:
+        """The arguments for the memory of its course."""
+        assert self.course
+        first, *rows = self.course.fields
+        return ", ".join([f"&self->{first.name}", *(f"self->{each.name}" for each in rows)] + ["NULL"] * (not rows))
+
+    def set(self, value: str) -> str:
+        """The call that sets the column to `value`."""
+        gain = f"{self.gain.table}, &self->{self.gain.name}"
+        if self.course is None:
+            return f"hystgen_gain_set({gain}, {value})"
+        return f"hystgen_course_set({gain}, {self.course.table}, {self.memory}, {value})"
+
+
+@dataclass(frozen=True)
 class ChainBlocks:
     """The blocks of a model, none without effects: for each operator those in front of the plays and those behind; its
-    clock; and the plays that rub."""
+    clock; the plays that rub; and how gains follow columns, with the indices of their settings."""
 
     sides: Mapping[str, tuple[list[NamedBlock], list[NamedBlock]]]
     clocks: list[NamedBlock]
     rubbing: list[NamedBlock | None]
+    courses: list[NamedBlock | None]
+    entries: list[int]
 
     @classmethod
     def none(cls, operators: Sequence[str]) -> ChainBlocks:
         """Those of a model without effects."""
-        return cls({op: ([], []) for op in operators}, [], [])
+        return cls({op: ([], []) for op in operators}, [], [], [], [])
 
     @classmethod
     def of(cls, t: ChainTables, operators: Sequence[str]) -> ChainBlocks:
         """The blocks of a model with effects."""
         from hystgen.compensator.chain import blocks
 
-        rubbing = [
-            NamedBlock(constants, f"{constants.kind.name}_{i}") if constants else None
-            for i, constants in enumerate(blocks.rubbing(t), 1)
-        ]
+        rubbing, courses = (
+            [
+                NamedBlock(constants, f"{constants.kind.name}_{i}") if constants else None
+                for i, constants in enumerate(blocks.beside(t, name), 1)
+            ]
+            for name in ("heat", "gain")
+        )
         clocks = [NamedBlock(each, "clock") for each in blocks.clocks(t)]
-        return cls({op: sides(t, op) for op in operators}, clocks, rubbing)
+        return cls({op: sides(t, op) for op in operators}, clocks, rubbing, courses, t.columns.entry.tolist())
 
     def blocks(self, operator: str) -> list[NamedBlock]:
         """Every block of an operator."""
         before, after = self.sides[operator]
-        return [*before, *after, *(each for each in self.rubbing if each), *self.clocks]
+        return [*before, *after, *(each for each in [*self.rubbing, *self.courses] if each), *self.clocks]
 
 
 def effects(t: ChainTables, chain: ChainBlocks, form: Form, writer: Writer) -> Tabled:
@@ -175,7 +220,7 @@ def glue(t: Variant, chain: ChainBlocks, form: Form, behind: Sequence[EmittedSta
     """The glue of a model with effects, or of one without in the loop engine, which is a chain without blocks;
     `behind`: its stages of saturation."""
     functions = "\n".join(_functions(op, t, chain, form, behind) for op in chain.sides)
-    heated = ["set_temperature"] * ("set_temperature" in t.calls)
+    heated = [call for call in ("set_temperature", "set_influence") if call in t.calls]
     aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
     every = ["settle", "set_offset", *heated, *aged]
     calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (t.taps > 0))]}
@@ -280,5 +325,6 @@ def _functions(op: str, t: Variant, chain: ChainBlocks, form: Form, behind: Sequ
         lead=f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and t.taps else "0",
         displacing=form.apart if behind or clocks else "static",
         travelling=form.apart if clocks or any(block.kind.name in moved for block in after) else "static",
+        columns=list(map(NamedColumn, kinds["gain"], chain.courses, chain.entries)),
         warming=["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in chain.rubbing],
     )

@@ -3,7 +3,9 @@ each kind of arithmetic holds the differences between floating and fixed point."
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -277,8 +279,8 @@ class Form(ABC):
         """Macros that a model with effects needs only in fixed point."""
         return []
 
-    def code_sizes(self, t: ChainTables) -> list[Macro]:
-        """Sizes of the codes that set a temperature or a gain."""
+    def code_sizes(self, t: ChainTables, columns: Sequence[str]) -> list[Macro]:
+        """Sizes of the codes that set a temperature, a gain or one of the `columns`."""
         return []
 
     def drive_bits(self, t: ChainTables) -> int:
@@ -413,6 +415,16 @@ class UnitTexts:
         return f", {unit}" if unit else ""
 
 
+def influence_macros(columns: Sequence[str]) -> list[str]:
+    """The names of columns in macros: in upper case, other characters as _, and with a number where two are equal."""
+    found: list[str] = []
+    for column in columns:
+        plain = re.sub(r"[^A-Z0-9]", "_", column.upper())
+        names = itertools.chain([plain], (f"{plain}_{i}" for i in itertools.count(2)))
+        found.append(next(name for name in names if name not in found))
+    return found
+
+
 @dataclass(frozen=True)
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain;
@@ -428,6 +440,11 @@ class EmittedModel:
     compiled: Compiled | None
     glue: Glue | None
     conversion: CodeConversion | None = None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that `set_influence` sets, by index."""
+        return tuple(column for column, *_ in self.compiled.columns) if self.compiled else ()
 
     @cached_property
     def measured(self) -> Measured | None:

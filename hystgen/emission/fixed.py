@@ -21,6 +21,7 @@ from hystgen.emission.compensator import (
     Writer,
     drives,
     entries,
+    influence_macros,
     macros,
     members,
     pointers,
@@ -57,6 +58,7 @@ class FixedForm(Form):
     settings: ClassVar[Mapping[str, str]] = {
         "temperature": "temperature, in codes of MODEL_TEMPERATURE_LSB",
         "gain": "gain relative to the parameter file's, in codes of MODEL_GAIN_LSB",
+        "value": "value of the column, in codes of its MODEL_INFLUENCE_.._LSB",
         "share": "0 to the largest code, which stands for 1",
     }
 
@@ -184,13 +186,18 @@ class FixedForm(Form):
             ("FINE_MAX", operand(high), ""),
         ]
 
-    def code_sizes(self, t: ChainTables) -> list[Macro]:
+    def code_sizes(self, t: ChainTables, columns: Sequence[str]) -> list[Macro]:
         from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 
         bits = int(31 - t.number.share_bits[0])
         degree = ("TEMPERATURE_LSB", repr(2.0 ** -TEMPERATURE_BITS[bits]), "degC per code of set_temperature")
         gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "per code of set_gain; travels are in drive codes")
-        return [*[degree] * ("set_temperature" in t.calls), *[gain] * ("set_gain" in t.calls)]
+        units = (unit for unit, entry in zip(t.columns.unit, t.columns.entry, strict=True) if entry >= 0)
+        influences = [
+            (f"INFLUENCE_{macro}_LSB", repr(1.0 / float(unit)), f"units of column {comment_text(column)} per code")
+            for macro, column, unit in zip(influence_macros(columns), columns, units, strict=True)
+        ]
+        return [*[degree] * ("set_temperature" in t.calls), *[gain] * ("set_gain" in t.calls), *influences]
 
     def drive_bits(self, t: ChainTables) -> int:
 

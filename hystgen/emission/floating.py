@@ -58,6 +58,7 @@ class FloatingForm(Form):
     settings: ClassVar[Mapping[str, str]] = {
         "temperature": "temperature, degC",
         "gain": "gain relative to the parameter file's",
+        "value": "value of the column, in its unit",
         "share": "0 to 1",
     }
 

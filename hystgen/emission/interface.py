@@ -15,7 +15,7 @@ from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
 from hystgen.compensator.converter import CodeLine
 from hystgen.emission import cost, runtime
-from hystgen.emission.compensator import EmittedModel, Macro
+from hystgen.emission.compensator import EmittedModel, Macro, influence_macros
 from hystgen.emission.cost import Cost
 from hystgen.emission.options import OPTIONS, Options
 from hystgen.emission.runtime import Piece
@@ -386,7 +386,24 @@ def _timing(one: EmittedModel) -> list[Macro]:
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest reference-to-drive gain, relative to that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "drive change per second up to which the errors below hold"),
-        *one.form.code_sizes(compiled.tables),
+        *_influences(one),
+        *one.form.code_sizes(compiled.tables, one.columns),
+    ]
+
+
+def _influences(one: EmittedModel) -> list[Macro]:
+    """Indices of the columns that `set_influence` sets, with the limits of each, beyond which it is limited."""
+    assert one.compiled
+    t = one.compiled.tables.columns
+    rows = [row for row, entry in zip(t.block, t.entry, strict=True) if entry >= 0]
+    units = [2.0 ** int(row["bits"]) * unit if one.compiled.tables.fixed else 1.0
+             for row, unit in zip(rows, t.unit[t.entry >= 0], strict=True)]
+    return [
+        (f"INFLUENCE_{macro}", f"{i}u", f"index of column {comment_text(column)}, limited to "
+         f"{row['lowest'] / unit:.6g} .. {row['highest'] / unit:.6g}")
+        for i, (macro, column, row, unit) in enumerate(
+            zip(influence_macros(one.columns), one.columns, rows, units, strict=True)
+        )
     ]
 
 
@@ -404,7 +421,7 @@ def status(one: EmittedModel) -> list[str]:
         slewed = "the drive was kept within its rate limit"
         found += [
             ("SLEW_LIMITED", slewed if one.variant.slew else "never set: nothing limits the drive's rate"),
-            ("LIMITED_SETTING", "an offset, gain or temperature was limited"),
+            ("LIMITED_SETTING", "an offset, gain, temperature or column was limited"),
         ]
     return _defined(one, ((f"STATUS_{name}", f"{1 << bit}u", words) for bit, (name, words) in enumerate(found)))
 
@@ -439,6 +456,7 @@ CALLS = {
     "settle": CallFacts(_FIRST, "at most that of two steps", _ENTERED),
     "set_offset": CallFacts(_FIRST, _FEW, _SET),
     "set_temperature": CallFacts(_FIRST, _FEW, _SET),
+    "set_influence": CallFacts(_FIRST, "a few operations and those of the column's plays, less than a step", _SET),
     "set_gain": CallFacts(_FIRST, _FEW, _SET),
     "travel": CallFacts(_FIRST, "one load"),
     "set_travel": CallFacts("after init and before the first step, or at any time", _FEW, _SET),
@@ -511,6 +529,7 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         "applied": drive,
         "d": _unit("output", one),
         "measured": _unit("output", one),
+        "i": f"index of the column, one of {macros}_INFLUENCE_*; any other is ignored, and reported as limited",
         "travel": "total distance that the drive has moved, in units of the drive",
         "code": f"code of the converter, {macros}_{'DRIVE' if call == 'drive_from_code' else 'REFERENCE'}_CODE_MIN .. "
         "MAX, beyond which it is limited; codes in two's complement have their sign extended to 32 bits",
@@ -576,7 +595,7 @@ WORDS = (
     ("pass", r"\bpass\[",
      "the input at which a move has taken a whole block along: the corner is passed, and forgotten"),
     ("kink", r"\bkink\b", "a point along the move where another play begins to follow"),
-    ("effect", r"_(?:creep|lag|gain|mode|heat|ageing|clock)_\w*table",
+    ("effect", r"_(?:creep|lag|gain|course|mode|heat|ageing|clock)_\w*table",
      "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
      "through it; solve: the input for an output now; resting: the input for an output at rest"),
     ("pending", r"\bpending\b",

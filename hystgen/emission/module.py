@@ -72,6 +72,7 @@ def _variant(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
         waiting=t.of("wait").samples, taps=len(t.tap), calls=frozenset(t.calls), moves=moves, bends=bends,
         elements=len(t.moving.elements.element), tilted=len(t.moving.elements.tilt) > 0,
+        late_column=bool(t.columns.course.lags.any()),
     )
 
 

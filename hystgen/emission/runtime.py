@@ -251,8 +251,8 @@ class Variant:
     limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
     `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
     add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
-    `elements`: number of elements in parallel with them; `tilted`: their drive is; `coded`: the inverse takes and
-    returns codes of converters.
+    `elements`: number of elements in parallel with them; `tilted`: their drive is; `late_column`: a column acts
+    through a lag; `coded`: the inverse takes and returns codes of converters.
     """
 
     engine: str
@@ -274,6 +274,7 @@ class Variant:
     bends: str = ""
     elements: int = 0
     tilted: bool = False
+    late_column: bool = False
     coded: bool = False
 
     @property
@@ -294,7 +295,7 @@ class Variant:
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
             "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre", "ELEMENTS": self.elements,
-            "TILT": self.tilted,
+            "TILT": self.tilted, "LATE_COLUMN": self.late_column,
             "MOVES_APART": self.bent and self.moves in self.family.moves_apart,
             "ORDERED_PLAYS": self.moves in self.family.ordered,
             "SMOOTH_SUM": self.smooth,

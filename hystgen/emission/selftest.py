@@ -11,7 +11,7 @@ import numpy as np
 
 from hystgen.compensator import converter, reference
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.emission.chain import SETTINGS
+from hystgen.emission.chain import SETTINGS, settings
 from hystgen.emission.compensator import EmittedModel
 from hystgen.emission.text import literal
 from hystgen.plays import slots
@@ -25,7 +25,9 @@ CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
 LETTERS = {
     "push": "p", "settle": "q", "set_offset": "o", "set_temperature": "t", "set_gain": "g", "set_travel": "d",
 }
-"""Letters for the settings that models with effects have."""
+"""Letters for the settings that models with effects have; capitals for columns, as many as there are letters."""
+
+LETTERED = 26
 
 WIDE = ("set_travel",)
 """Settings with more bits than a code, too many for fixed-point samples."""
@@ -54,7 +56,7 @@ class Operator:
     """The test of an operator: its settings with their letters, and its samples in C."""
 
     name: str
-    settings: list[tuple[str, str]]
+    settings: list[tuple[str, str, str]]
     samples: list[str]
 
 
@@ -62,11 +64,18 @@ def operators(one: EmittedModel) -> list[Operator]:
     """The tests of a model's operators."""
     wide = WIDE if one.family.arithmetic.travels > 1 else ()
     found = []
+    columns = min(len(one.columns), LETTERED)
     for name in one.options.operators:
-        own = [call for call in SETTINGS if call in one.calls.get(name, ()) and call not in wide]
-        settings = [(LETTERS[call], call) for call in own]
-        found.append(Operator(name, settings, _samples(one, name == "inverse", own)))
+        calls = set(one.calls.get(name, ())).difference(wide)
+        own = list(settings(calls, columns)) if calls else []
+        lettered = [(_letter(code, call), call, more) for code, call, more in own]
+        found.append(Operator(name, lettered, _samples(one, name == "inverse", own)))
     return found
+
+
+def _letter(code: int, call: str) -> str:
+    """The letter for a setting, by its code and its name in C."""
+    return LETTERS[call] if call in LETTERS else chr(ord("A") + code - SETTINGS[call])
 
 
 CODES = 60
@@ -87,22 +96,27 @@ def codes(one: EmittedModel) -> list[tuple[str, str]]:
     return [(literal(a), literal(b)) for a, b in zip(given, sent, strict=True)]
 
 
-def _setting(t: ChainTables, call: str, turn: int) -> float:
+def _setting(t: ChainTables, code: int, call: str, turn: int) -> float:
     """An argument for a setting, in fixed point before rounding to a code. Every third argument exceeds the limits, if
     there are any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 
-    degree, one = setting_codes(t)
+    _, one = setting_codes(t)
     drive_low, drive_high, low, high = (float(end) for end in (*t.limits.drive[0], *t.limits.output[0]))
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
         return drive_low + (0.5 + way) * (drive_high - drive_low)
     if call == "set_offset":
         return way * (high - low)
-    if call == "set_temperature":
-        holds = next(of(t.of(part.name)) for part in PARTS if t.number_of(part.name) and (of := part.of(t).degrees))
-        return degree * (holds + 40.0 * way)
+    if call in ("set_temperature", "set_influence"):
+        columns, entry = t.columns, code - SETTINGS[call] if call == "set_influence" else -1
+        j = columns.entry.tolist().index(entry)
+        scale = columns.unit[j] if t.fixed else 1.0
+        ends = (columns.block[end][j] for end in ("lowest", "highest"))
+        low, high = (float(end) / 2.0 ** int(columns.block["bits"][j] if t.fixed else 0) for end in ends)
+        far = 40.0 * scale if call == "set_temperature" else high - low
+        return float(scale * columns.middle[j] + far * way)
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
@@ -110,7 +124,7 @@ def _setting(t: ChainTables, call: str, turn: int) -> float:
     return low + (0.5 + way) * (high - low)
 
 
-def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[str]:
+def _samples(one: EmittedModel, inverse: bool, own: Sequence[tuple[int, str, str]]) -> list[str]:
     """Calls, each with its letter and argument, and the expected answer and status."""
     numbers, between = one.numbers.tables, one.form.between
     low, high = numbers.limits.output[0] if inverse else numbers.limits.drive[0]
@@ -125,17 +139,17 @@ def _samples(one: EmittedModel, inverse: bool, settings: Sequence[str]) -> list[
         if i == 120:
             calls.append(slots.OP_RESET)
             arguments.append(between(low, high, 0.25))
-        if settings and not isinstance(numbers, Tables | FixedTables) and i % 11 == 5:
-            call = settings[i // 11 % len(settings)]
-            calls.append(SETTINGS[call])
-            argument = _setting(numbers, call, i // 11 // len(settings))
+        if own and not isinstance(numbers, Tables | FixedTables) and i % 11 == 5:
+            code, call, _ = own[i // 11 % len(own)]
+            calls.append(code)
+            argument = _setting(numbers, code, call, i // 11 // len(own))
             arguments.append(argument)
     x = reference.nearest(numbers, np.array(arguments))
     op = np.array(calls, dtype=np.uint8)
     op[:-1:2] |= slots.OP_UNREAD  # so that bits have to persist until they are read
     answers, status = reference.answers(numbers, inverse, op, x, compiled=False)
     status[op >= slots.OP_UNREAD] = slots.OP_UNREAD
-    letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}
+    letters = {**CALLS, **{code: _letter(code, call) for code, call, _ in own}}
     return [
         f"{{'{letters[c]}', {literal(a)}, {literal(y)}, {s}u}}"
         for c, a, y, s in zip(calls, x, answers, status, strict=True)

@@ -8,6 +8,7 @@ lasting step.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -134,7 +135,7 @@ def steps(record: Record) -> Steps | None:
     if not (np.isfinite(v).all() and np.isfinite(y).all()) or np.ptp(v) == 0.0 or np.ptp(y) == 0.0:
         return None
     move = np.diff(y)
-    return _wrapped(v, y, move) or _slips(v, y, move)
+    return _wrapped(v, y, move) or _slips(v, y, move, record.extra)
 
 
 # A counter that wraps ------------------------------------------------------------------------------------------
@@ -187,8 +188,9 @@ def _median(x: Array, places: Indices) -> Array:
 # Slips of a fringe ---------------------------------------------------------------------------------------------
 
 
-def _slips(v: Array, y: Array, move: Array) -> Steps | None:
+def _slips(v: Array, y: Array, move: Array, columns: Mapping[str, Array]) -> Steps | None:
     at = _sudden(v, y, move)
+    at = at[~_logged(at, columns)]
     at = _without_returns(at, move, len(y))
     if not 0 < len(at) <= MOST or _its_own(at, v, y, move):
         return None
@@ -205,6 +207,17 @@ def _slips(v: Array, y: Array, move: Array) -> Steps | None:
     found = Steps(at + 1, _sizes(v, y, at))
     # the rest must be a motion; an output that only jumps leaves none
     return found if float(np.sum(np.abs(found.sizes))) < float(np.ptp(found.bridged(y))) else None
+
+
+def _logged(at: Indices, columns: Mapping[str, Array]) -> NDArray[np.bool_]:
+    """The steps at which a logged column steps too, which may cause them: a load put on, another axis that moves."""
+    beside = np.concatenate([np.arange(-AROUND, 0), np.arange(1, AROUND + 1)])
+    found = np.zeros(len(at), dtype=np.bool_)
+    for column in columns.values():
+        size = np.abs(np.diff(np.asarray(column, dtype=np.float64)))
+        around = np.max(size[np.clip(at[:, None] + beside, 0, len(size) - 1)], axis=1)
+        found |= size[at] > CLEAR * around
+    return found
 
 
 def _its_own(at: Indices, v: Array, y: Array, move: Array) -> bool:

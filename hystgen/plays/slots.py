@@ -19,6 +19,9 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
+# the first of the calls that set a column, and their largest number
+OP_INFLUENCE = 64
+MOST_COLUMNS = 64
 # the bits that identify a call, and a flag: leave its status unread, for a later call to report along with its own
 OP_CALL, OP_UNREAD = 127, 128
 

@@ -32,6 +32,7 @@ class CompiledInstance:
         self._ffi.cdef(
             f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"
             f"{real} {name}_{op}_step(void *, {real});"
+            f"void {name}_{op}_set_influence(void *, unsigned int, {real});"
         )
         # A loaded library survives without its file; only Windows keeps the file while it is loaded
         with writing.temporary() as folder:
@@ -43,11 +44,16 @@ class CompiledInstance:
         self._context = self._ffi.new("long long[]", size // 8 + 1)
         self._init = getattr(self._library, f"{name}_{op}_init")
         self._step = getattr(self._library, f"{name}_{op}_step")
+        self._set_influence = f"{name}_{op}_set_influence"
         self.reset()
 
     def reset(self) -> None:
         """Return to the start memory of the parameter file."""
         self._init(self._context)
+
+    def set_influence(self, i: int, value: float) -> None:
+        """Set column i, for a model that follows one."""
+        getattr(self._library, self._set_influence)(self._context, i, value)
 
     def step(self, x: float) -> float:
         """One sample."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -155,8 +156,9 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
     drive_low, drive_high = (float(a) for a in tables.limits.drive[0])
     rng = np.random.default_rng(20261126)
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
-    if "set_temperature" in tables.calls:
-        kinds.append(slots.OP_TEMPERATURE)
+    columns = tables.columns
+    set_by = np.where(columns.entry < 0, slots.OP_TEMPERATURE, slots.OP_INFLUENCE + columns.entry)
+    kinds += set_by.tolist()
     if "travel" in tables.calls:
         kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
     if inverse:
@@ -173,9 +175,14 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         op[rng.random(length) < 0.001] = slots.OP_INIT
         drives = rng.uniform(drive_low - 5.0, drive_high + 5.0, length)
         x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
-        degree, gain = setting_codes(tables)
+        _, gain = setting_codes(tables)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
-        x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
+        for j, call in enumerate(set_by.tolist()):
+            low_end, high_end = (float(columns.block[end][j]) for end in ("lowest", "highest"))
+            code = 2.0 ** int(columns.block["bits"][j]) if tables.fixed else 1.0
+            far = 30.0 * columns.unit[j] if call == slots.OP_TEMPERATURE else math.inf
+            span = min((high_end - low_end) / code, far)
+            x = np.where(op == call, columns.unit[j] * columns.middle[j] + rng.standard_cauchy(length) * span, x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
         x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(-1.0, 9.0, length), x)
         odd = rng.random(length) < np.where(op == slots.OP_STEP, 0.01, 0.1)

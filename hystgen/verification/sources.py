@@ -12,7 +12,7 @@ from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
 from hystgen.basics import writing
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
 from hystgen.emission import module, runtime
-from hystgen.emission.chain import SETTINGS
+from hystgen.emission.chain import settings
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.plays import slots
@@ -50,28 +50,30 @@ def harness(
     more: Mapping[str, Sequence[str]] = MappingProxyType({}),
     arithmetic: Arithmetic = FLOAT32,
     coded: bool = False,
+    columns: int = 0,
 ) -> str:
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator;
-    `coded`: whether the inverse steps from code to code."""
-    chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
+    `coded`: whether the inverse steps from code to code; `columns`: number of those that are set."""
+    chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic, columns)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
         chain=chain, coded=coded,
     )
 
 
-def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:
+def _chain_calls(
+    name: str, op: str, more: Sequence[str], arithmetic: Arithmetic, columns: int
+) -> Iterator[tuple[int, str]]:
     """The number and the statement of each call that only models with effects have.
 
     In fixed point, travels have more bits than codes: those set are multiples of 2^TRAVEL_BITS, and the low bits are
     compared.
     """
     own = f"{name}_{op}"
-    for call, number in SETTINGS.items():
-        if call in more:
-            wide = arithmetic.travels > 1 and call == "set_travel"
-            travel = f" * ((int64_t)1 << {TRAVEL_BITS})" if wide else ""
-            yield number, f"{own}_{call}(&self, x[i]{travel})"
+    for number, call, given in settings(more, columns):
+        wide = arithmetic.travels > 1 and call == "set_travel"
+        travel = f" * ((int64_t)1 << {TRAVEL_BITS})" if wide else ""
+        yield number, f"{own}_{call}(&self, {given}x[i]{travel})"
     if "travel" in more:
         yield slots.OP_TRAVELLED, f"answer[i] = ({name}_real_t){own}_travel(&self)"
     if "expected" in more:
@@ -89,7 +91,9 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic], coded)
+    texts["hystgen_harness.c"] = harness(
+        name, options.operators, calls, ARITHMETICS[options.arithmetic], coded, len(emitted.compensator.columns)
+    )
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded)

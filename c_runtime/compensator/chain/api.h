@@ -14,6 +14,8 @@ void hystgen_operator_settle(hystgen_operator_t *self, hystgen_real_t v);
 void hystgen_operator_set_offset(hystgen_operator_t *self, hystgen_real_t d);
 /* Sets the temperature, degC, from the next step on. */
 void hystgen_operator_set_temperature(hystgen_operator_t *self, hystgen_real_t temperature);
+/* Sets column i, from the next step on. */
+void hystgen_operator_set_influence(hystgen_operator_t *self, unsigned int i, hystgen_real_t value);
 /* Sets a gain that replaces the gain by travel, from the next step on, until a travel is set. */
 void hystgen_operator_set_gain(hystgen_operator_t *self, hystgen_real_t gain);
 /* Distance travelled by the drive: store this number where it survives a power cycle, and set it

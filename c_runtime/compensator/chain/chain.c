@@ -64,6 +64,9 @@ HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_passed_on(hystgen_operator_t 
 /* The actuator has seen drive v. */
 HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_absorb(hystgen_operator_t *self,
                                                           hystgen_real_t v) {
+#ifdef HYSTGEN_HAS_LATE_COLUMN
+    hystgen_operator_tick(self);
+#endif
     if (self->moving) {
         hystgen_operator_travelled(self, v);
     }

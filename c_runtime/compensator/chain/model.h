@@ -138,6 +138,8 @@ void hystgen_operator_settings_init(hystgen_operator_t *self);
 void hystgen_operator_travelled(hystgen_operator_t *self, hystgen_real_t v);
 void hystgen_operator_clock_start(hystgen_operator_t *self);
 bool hystgen_operator_heat(hystgen_operator_t *self, hystgen_real_t temperature);
+bool hystgen_operator_influence(hystgen_operator_t *self, unsigned int i, hystgen_real_t value);
+void hystgen_operator_tick(hystgen_operator_t *self);
 
 #include "compensator/api.h"
 #include "compensator/chain/api.h"

@@ -55,6 +55,15 @@ void hystgen_operator_set_temperature(hystgen_operator_t *self, hystgen_real_t t
     }
 }
 
+void hystgen_operator_set_influence(hystgen_operator_t *self, unsigned int i,
+                                    hystgen_real_t value) {
+    if (!hystgen_finite(value)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+    } else if (hystgen_operator_influence(self, i, value)) {
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
+}
+
 #ifdef HYSTGEN_INVERSE
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_real_t level = u;

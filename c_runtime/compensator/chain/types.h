@@ -434,24 +434,24 @@ typedef struct {
 } hystgen_friction_t;
 
 #ifdef HYSTGEN_FIXED
-/* Gain and offset per degree above the reference, between two temperatures. */
+/* Gain and offset per unit of a column above the reference, between two values of the column. */
 typedef struct {
-    hystgen_factor_t per_degree;
-    hystgen_factor_t offset_per_degree;
+    hystgen_factor_t per_unit;
+    hystgen_factor_t offset_per_unit;
     hystgen_signal_t reference;
-    hystgen_signal_t coldest;
-    hystgen_signal_t hottest;
-    uint8_t bits; /* of a temperature below a code */
+    hystgen_signal_t lowest;
+    hystgen_signal_t highest;
+    uint8_t bits; /* of a value below a code */
 } hystgen_gain_table_t;
 
 #else
-/* Gain and offset per degree above the reference, between two temperatures. */
+/* Gain and offset per unit of a column above the reference, between two values of the column. */
 typedef struct {
-    hystgen_factor_t per_degree;
-    hystgen_factor_t offset_per_degree;
+    hystgen_factor_t per_unit;
+    hystgen_factor_t offset_per_unit;
     hystgen_signal_t reference;
-    hystgen_signal_t coldest;
-    hystgen_signal_t hottest;
+    hystgen_signal_t lowest;
+    hystgen_signal_t highest;
 } hystgen_gain_table_t;
 
 #endif
@@ -463,7 +463,39 @@ typedef struct {
     hystgen_signal_t offset;
 } hystgen_gain_t;
 
+/* A play of a column. */
+typedef struct {
+    hystgen_signal_t threshold;
+    hystgen_factor_t weight;
+} hystgen_course_play_t;
+
+/* A play of a column. */
+typedef struct {
+    hystgen_signal_t at; /* value of the play */
+} hystgen_course_state_t;
+
+/* How gain and offset follow a column other than at once and along a line. */
+typedef struct {
+    const hystgen_course_play_t *play;
+    uint_least16_t n;      /* plays of the column */
+    uint_least16_t turns;  /* Newton steps for the reciprocal of a gain that has changed */
+    uint_least8_t lags;    /* 1 if the column acts through a first-order lag */
+    hystgen_factor_t rate; /* share of the distance that the lag covers in a step, */
+    hystgen_factor_t late; /* and of a change within the step */
+    hystgen_factor_t inverse_reach;
+    hystgen_signal_t square; /* offset at the reach, of the column's square */
+    hystgen_signal_t cube;   /* and cube */
+} hystgen_course_table_t;
+
 #ifdef HYSTGEN_FIXED
+/* A column that has been set. */
+typedef struct {
+    hystgen_signal_t high; /* the column above its reference, behind the lag; */
+    hystgen_signal_t now;  /* the column, set last, */
+    hystgen_signal_t seen; /* and at the previous sample */
+    bool begun;            /* it has been set */
+} hystgen_course_t;
+
 /* Mode of the stage. Its two states are output minus input, and the rate of this difference; in a
    step they change by shares of themselves (keep, swing), of each other (turn), and of a change in
    the input (lead, in fixed point late minus the change itself, and push). */
@@ -479,6 +511,15 @@ typedef struct {
 } hystgen_mode_table_t;
 
 #else
+/* A column that has been set. */
+typedef struct {
+    hystgen_signal_t high; /* the column above its reference, behind the lag; */
+    hystgen_signal_t low;  /* its rounding remainder */
+    hystgen_signal_t now;  /* the column, set last, */
+    hystgen_signal_t seen; /* and at the previous sample */
+    bool begun;            /* it has been set */
+} hystgen_course_t;
+
 /* Mode of the stage. Its two states are output minus input, and the rate of this difference; in a
    step they change by shares of themselves (keep, swing), of each other (turn), and of a change in
    the input (lead, in fixed point late minus the change itself, and push). */

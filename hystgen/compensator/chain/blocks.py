@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
-from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, PARTS, parts_with
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, NAMES, PARTS, parts_with
 from hystgen.effects.kinds import Constants
 from hystgen.effects.part import ChainPart
 
@@ -26,14 +26,17 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constant
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
-    """The blocks on both sides, plays that generate heat by friction, and the clock of a drift."""
-    return [*of(t, (*AHEAD, *BEHIND), operator), *(each for each in rubbing(t) if each), *clocks(t)]
+    """The blocks on both sides, their additional structs, and the clock of a drift."""
+    besides = (each for part in PARTS for each in beside(t, part.name) if each)
+    return [*of(t, (*AHEAD, *BEHIND), operator), *besides, *clocks(t)]
 
 
-def rubbing(t: ChainTables) -> list[Constants | None]:
-    """For each block of own heat, the plays whose friction heats it, or None if the square of the drive heats it."""
-    pairs = zip(PARTS, t.blocks, strict=True)
-    return [each for part, tables in pairs for each in part.of(t).beside(tables)]
+def beside(t: ChainTables, name: str) -> list[Constants | None]:
+    """For each block of a part, the constants of its additional struct, or None without one: for own heat the plays
+    whose friction heats it, unless the square of the drive does; for a gain how it follows its column, unless at once
+    and along a line."""
+    part = PARTS[NAMES.index(name)]
+    return list(part.of(t).beside(t.of(name)))
 
 
 def clocks(t: ChainTables) -> list[Constants]:

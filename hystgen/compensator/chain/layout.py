@@ -154,7 +154,18 @@ class ChainTables(NamedTuple):
     @property
     def calls(self) -> set[str]:
         """The calls that the chain's blocks add to the interface."""
-        return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
+        here = [part for part in PARTS if self.number_of(part.name)]
+        return {call for part in here for call in (*part.calls, *part.told(self.of(part.name)))}
+
+    @property
+    def columns(self) -> Any:
+        """The tables of the gains that follow a column."""
+        return self.of("gain")
+
+    @property
+    def influences(self) -> int:
+        """Number of columns that `set_influence` sets."""
+        return int(np.max(self.columns.entry, initial=-1)) + 1
 
     @property
     def braked(self) -> bool:
@@ -253,6 +264,13 @@ class Compiled:
     """modes that the taps keep from ringing, in addition to compensating a delay and inverting other modes"""
     codes: Codes | None = None
     """only in fixed point"""
+
+    @property
+    def columns(self) -> list[tuple[str, int, float]]:
+        """The columns that `set_influence` sets: name, index, and the number to set per unit of the column."""
+        t = self.tables.columns
+        rows = zip(self.parts.blocks["gain"], t.entry.tolist(), t.unit.tolist(), strict=True)
+        return [(column, entry, unit) for effect, entry, unit in rows if entry >= 0 for column in effect.read]
 
     @property
     def largest_step(self) -> float:

@@ -93,7 +93,7 @@ def _searched(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     low, high = (float(end) for end in t.limits.output[0])
     fastest = compiled.largest_step / (ends[1] - ends[0])
     worst, count = 0.0, 0
-    columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.columns}
+    columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.read}
     for share in (kind(fastest * speed) for kind in (_legs, _multisine) for speed in SPEEDS):
         whole = low + (high - low) * share
         given = whole.astype(t.threshold.dtype).astype(np.float64) if codes is None else np.rint(whole)

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import Compiled
-from hystgen.compensator.chain.parts import PARTS
 from hystgen.effects.base import Run
 from hystgen.plays import slots
 
@@ -25,7 +23,7 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     is repeated.
 
     Bits about a sample itself (limited, held) come with the sample, bits about a drive with the drive. Fixed point
-    takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.
+    takes and gives codes, except columns, which are in their units. Raises ValueError for numbers that are not codes.
     """
     t = compiled.tables
     x = reference.samples(t, record.v)
@@ -33,14 +31,16 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
     calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
     given = [x[:ahead]]
-    heated = [part for part in PARTS if "set_temperature" in part.calls]
-    logged = [column for part in heated for effect in compiled.parts.blocks[part.name] for column in effect.columns]
-    if logged:
-        op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
-        calls.append(op)
-        degree, _ = setting_codes(t)
-        warm = reference.nearest(t, degree * record.extra[logged[0]])
-        given.append(np.column_stack([warm, later]).ravel())
+    columns = t.columns
+    followers = compiled.parts.blocks["gain"]
+    if followers:
+        entry = np.where(columns.entry < 0, slots.OP_TEMPERATURE, slots.OP_INFLUENCE + columns.entry)
+        calls.append(np.tile(np.append(entry, slots.OP_STEP).astype(np.uint8), len(x)))
+        values = [
+            reference.nearest(t, unit * record.extra[column])
+            for unit, effect in zip(columns.unit.tolist(), followers, strict=True) for column in effect.read
+        ]
+        given.append(np.column_stack([*values, later]).ravel())
     else:
         calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))
         given.append(later)

@@ -7,7 +7,7 @@ time-invariant, so their order does not matter.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from hystgen.basics.jit import Action, Answer, Check, LimitedAnswer, Scalar, jit
 from hystgen.compensator.chain.layout import ChainTables
@@ -111,8 +111,29 @@ def told(every: Sequence[Verbs], verb: str) -> Check:
     return _all(every, verb, and_then, nothing)
 
 
-def resetting(every: Sequence[Verbs]) -> Action:
-    """Reset all blocks to their values in the parameter file."""
+def told_of(every: Sequence[Verbs]) -> Callable[..., bool]:
+    """A function that passes the value of a column, by its index, to all blocks, and returns whether any of them had to
+    limit it."""
+
+    def and_then(first: Any, k: int, function: Any) -> Any:
+        @jit(inline=True)
+        def both(t: ChainTables, s: BlockMemory, entry: int, x: Scalar) -> bool:
+            limited = first(t, s, entry, x)
+            for j in range(s.counts[k]):
+                limited = function(t.blocks[k], s.blocks[k], j, entry, x) or limited
+            return bool(limited)
+
+        return both
+
+    @jit(inline=True)
+    def nothing(t: ChainTables, s: BlockMemory, entry: int, x: Scalar) -> bool:  # noqa: ARG001  as with blocks
+        return False
+
+    return _all(every, "set_column", and_then, nothing)
+
+
+def calling(every: Sequence[Verbs], verb: str) -> Action:
+    """A verb without arguments of all blocks that have it."""
 
     def and_then(first: Action, k: int, function: Action) -> Action:
         @jit(inline=True)
@@ -125,9 +146,9 @@ def resetting(every: Sequence[Verbs]) -> Action:
 
     @jit(inline=True)
     def nothing(t: ChainTables, s: BlockMemory) -> None:
-        """No block has a setting."""
+        """No block has this verb."""
 
-    return _all(every, "reset", and_then, nothing)
+    return _all(every, verb, and_then, nothing)
 
 
 def moves(every: Sequence[Verbs]) -> Action:

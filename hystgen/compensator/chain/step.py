@@ -16,7 +16,7 @@ from hystgen.basics.structures import Flag, Play, Reach, Real, Signal, Struct, U
 from hystgen.compensator.chain.layout import ChainTables, Contents, OwnChainTables
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, LED, PARTS, SENT, parts_with
 from hystgen.compensator.chain.preview import PreviewLine, preview_put, preview_repeat
-from hystgen.compensator.chain.sides import Blocks, moves, resetting, side_of, told
+from hystgen.compensator.chain.sides import Blocks, calling, moves, side_of, told, told_of
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
@@ -33,6 +33,7 @@ from hystgen.plays.slots import (
     OP_CORRECT,
     OP_EXPECTED,
     OP_GAIN,
+    OP_INFLUENCE,
     OP_OFFSET,
     OP_PUSH,
     OP_SETTLE,
@@ -161,7 +162,7 @@ def made_of(
     every = [verbs if has else Verbs(verbs.memory) for verbs, has in zip(known, contents.parts, strict=True)]
     timed, aged = contents.parts[CLOCK], contents.parts[AGED]
     still, lagging = inverse and quiet, inverse and turning
-    blocks_reset, blocks_move = resetting(every), moves(every)
+    blocks_reset, blocks_tick, blocks_move = calling(every, "reset"), calling(every, "tick"), moves(every)
     clock: Any = known[CLOCK]  # has all of the verbs below
     clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
     travelled_by = known[AGED].travelled
@@ -344,6 +345,7 @@ def made_of(
         """Absorb drive v, which has become `reached` behind delay and slew limit; the first drive finds everything at
         rest."""
         moving = s.own.moving[0] != 0
+        blocks_tick(t, s)
         if moving:
             travelled(t, s, v)
         x = drive_signal(t, reached)
@@ -548,9 +550,16 @@ def made_of(
 
         return set_number
 
-    set_temperature, set_gain, set_travel = (
-        setting(told(every, f"set_{what}")) for what in ("temperature", "gain", "travel")
-    )
+    set_gain, set_travel = (setting(told(every, f"set_{what}")) for what in ("gain", "travel"))
+    put_column = told_of(every)
+
+    @jit
+    def set_column(t: ChainTables, s: ChainState, entry: int, x: Scalar) -> None:
+        """Set a column by its index, -1 for the temperature, within its limits."""
+        if not finite(t, x):
+            s.plays.step.status[0] |= HELD
+        elif put_column(t, s, entry, x):
+            s.plays.step.status[0] |= LIMITED_SETTING
 
     @jit(inline=True)
     def start_at(t: ChainTables, s: ChainState, after: int) -> None:
@@ -608,7 +617,7 @@ def made_of(
         elif call == OP_OFFSET:
             set_offset(t, s, level_signal(t, x))
         elif call == OP_TEMPERATURE:
-            set_temperature(t, s, x)
+            set_column(t, s, -1, x)
         elif call == OP_GAIN:
             set_gain(t, s, x)
         elif call == OP_TRAVEL:
@@ -620,6 +629,8 @@ def made_of(
             correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
+        elif call >= OP_INFLUENCE:
+            set_column(t, s, call - OP_INFLUENCE, x)
         return t.limits.zero[0]
 
     held = inverse_held if slew else last_answer

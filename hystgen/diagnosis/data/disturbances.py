@@ -55,7 +55,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     """The strongest line that enough of the long records show, or that dominates the errors of a few records."""
     found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
-        found += [(share, frequency, k) for share, frequency in peaks(item, error)]
+        found += [(share, frequency, k) for share, frequency in peaks(item, error) if not _logged(item, frequency)]
     times = [item.run.t[np.isfinite(e)] for item, e in zip(items, errors, strict=True)]
     lengths = [float(np.ptp(t)) if len(t) > acceptance.LINE_SAMPLES else 0.0 for t in times]
     rates = [1.0 / float(np.median(np.diff(item.run.t))) for item in items]
@@ -100,6 +100,15 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     return Removed(finding, after, removed_share(errors, after))
 
 
+def _logged(item: Item, frequency: float) -> bool:
+    """Whether a logged column has this line too, so that the column may cause it; mains hum reaches every channel."""
+    width = 1.0 / max(float(np.ptp(item.run.t)), 1e-300)
+    if _mains(frequency, width) is not None:
+        return False
+    lines = (line for column in item.run.extra.values() for _, line in peaks(item, column))
+    return any(abs(line - frequency) < acceptance.SAME_BINS * width for line in lines)
+
+
 def _mains(frequency: float, width: float) -> float | str | None:
     """The mains frequency that a line matches, or the harmonic as text; `width`: uncertainty of its frequency, Hz."""
     for mains in MAINS:
@@ -107,6 +116,20 @@ def _mains(frequency: float, width: float) -> float | str | None:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
                 return mains if n == 1 else f"{n} x {mains:g} Hz"
     return None
+
+
+def mains(items: Sequence[Item], values: Sequence[Array]) -> list[float]:
+    """Frequencies in Hz of the mains lines in signals of the records, at most one for each harmonic looked for."""
+    found: list[float] = []
+    if not all(item.timed for item in items):
+        return found
+    for _ in MAINS_HARMONICS:
+        line = in_time(items, values)
+        if line is None or not isinstance(line.finding, Line) or line.finding.mains is None:
+            break
+        found.append(line.finding.frequency)
+        values = line.errors
+    return found
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:

@@ -26,7 +26,7 @@ from hystgen.diagnosis.findings.result import (
     Stretch,
     Withdrawn,
 )
-from hystgen.diagnosis.search import acceptance, fits
+from hystgen.diagnosis.search import acceptance, fits, shared
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.selection import Found, Outcome, Ranked, Refusal
@@ -80,6 +80,7 @@ def result_of(
         advice=(
             *(TOLD_APART.get(frozenset(pair), _advice(*pair)) for pair in rivals),
             *([ONE_LOOP] if (rivals or structured) and one_loop else []),
+            *_of_columns(found),
             *(more for each in remaining for more in each.advice()),
         ),
         ranking=tuple(tuple(_contender(each, unit) for each in ranked) for ranked in found.rankings),
@@ -90,6 +91,19 @@ def result_of(
         written=found.written,
     )
     return cast("Result", _in_digits(result))
+
+
+def _of_columns(found: Outcome) -> list[str]:
+    """What to record if an error may follow a column that these records do not separate from time, mains or drive."""
+    columns = [
+        shared.column_of(each.tried.fitted) for ranked in found.rankings for each in ranked
+        if each.refused is not None and each.refused.why == "shared"
+    ]
+    return [
+        f"these records do not show whether the error follows column {column} or only changes along with it: repeat a "
+        f"loop while {column} alone is changed, up and back, at times of your own choice"
+        for column in dict.fromkeys(columns)
+    ]
 
 
 def _contender(ranked: Ranked, unit: str | None) -> Contender:
@@ -133,6 +147,8 @@ REFUSALS = {
     "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
     "grows": "with a time constant of {value:.3g} s it only grows during {limit:.3g} s of records, as disturbances can",
+    "shared": "only {value:.0%} of what it removes belongs to the column alone, and the rest to what the column shares "
+    "with time, mains or the drive; a name needs {limit:.0%}",
     "range": "{value:.0%} of the gap above the noise remains; with a parameter at an end of its range, "
     "at most {limit:.0%} may",
     "forgets": "hysteresis other than a play sum explains the error at least as well: {value:.3g}{unit} rms remains",
@@ -202,7 +218,7 @@ def _effects(
                 each.before,
                 each.after,
                 each.p_value,
-                _evidence(each, refitted, noise),
+                _evidence(each, parameters.get("column"), refitted, noise),
                 bool(ends) or _twice(parameters.get("time_constants", ())),
                 ends,
                 each.known,
@@ -222,10 +238,11 @@ def _advice(one: str, other: str) -> str:
     return f"these records do not separate {one} and {other}; hystgen diagnose --plan writes drives that do"
 
 
-def _evidence(each: Found, refitted: float, noise: float) -> str:
+def _evidence(each: Found, column: str | None, refitted: float, noise: float) -> str:
+    follows = f"the residual follows column {column}: " if column else ""
     gain = 100.0 * (1.0 - each.after / each.before) if each.before else 0.0
     change = f"{gain:.0f} % less" if gain >= 0.0 else f"{-gain:.0f} % more"
-    said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({change})"
+    said = f"{follows}{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({change})"
     if is_noise(each.after, noise) or not refitted:
         return said
     return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap remain"

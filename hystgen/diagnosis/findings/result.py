@@ -373,7 +373,7 @@ class Diagnosis:
         before, after = self._rms(gap.refitted.holdout), self._rms(gap.after.holdout)
         structured = any(isinstance(each, Structured) for each in seen)
         if self.verdict == "effects_found":
-            names = ", ".join(self._name(each.name) for each in result.effects if each.unsupported is None)
+            names = ", ".join(self._named(each) for each in result.effects if each.unsupported is None)
             more = f", {self._times(gap.after.holdout)} and with structure" if structured else ""
             if gap.after.holdout > acceptance.MUCH_LEFT * result.noise_floor:
                 by = f"{100.0 * (1.0 - gap.after.holdout / gap.refitted.holdout):.0f} %"
@@ -453,6 +453,11 @@ class Diagnosis:
         except (EffectsError, NotInvertibleError) as error:
             return str(error)
         return ""
+
+    def _named(self, effect: NamedEffect) -> str:
+        """An effect in a verdict: its name, and the column that the residual follows if it follows one."""
+        column = effect.parameters.get("column")
+        return self._name(effect.name) + (f" (the residual follows column {column})" if column else "")
 
     def _name(self, name: str) -> str:
         """An effect's name, with the names of effects that cannot be separated from it."""

@@ -696,3 +696,16 @@ BEYOND_GAIN = 3.0
 the held-out rms that the effects explain or, if larger, of the noise. The multiple was 0.85 to 0.97 for creep, a lag
 and relaxing plays at three speeds, with noise at 0.1 % of the output. Changed by:
 acceptance::an_output_that_moves_further."""
+
+SHARED_DEGREE = 5
+"""[degree] Polynomial in time, for each record, that any drift may follow: a column that shares it explains the drift
+without being its cause. Set by: benchmarks/influences.py."""
+
+SHARED_LAGS = (0.003, 0.02, 0.1)
+"""[fractions of a record] Time constants of averages of the drive that a column may share with the output, as a monitor
+of the drive or of its current does. Set by: benchmarks/influences.py."""
+
+OWN_SHARE = 0.08
+"""[fraction of the removed power] A column is named only if at least this much of what it removes belongs to it alone,
+apart from time, mains and drive: 0.14 and more for the other axis of `examples/xy_stage`, at most 0.03 for a column
+that shares its drift with the output. Set by: benchmarks/influences.py."""

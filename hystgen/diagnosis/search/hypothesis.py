@@ -87,7 +87,7 @@ class Actuator(Ordered):
         for effect in self.at(Place.GAIN):
             key = id(effect), id(whole)
             if key not in self.gains:
-                self.gains[key] = effect, whole, effect.gain(whole), effect.offset(whole)
+                self.gains[key] = effect, whole, *effect.gains(whole)
             gain, offset = (values[item.part][now] for values in self.gains[key][2:])
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR)[len(self.filters) :]:

@@ -79,10 +79,17 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
         float(sum(np.sum(np.abs(np.diff(item.run.v))) for item in items)),
         tuple(float(r) for r in thresholds),
         frozenset(columns),
+        {name: _ends([item.run.extra[name] for item in items]) for name in columns},
         timed=all(item.timed for item in items),
         output=(min(float(y.min()) for y in outputs), max(float(y.max()) for y in outputs)) if outputs else (0.0, 0.0),
         speeds=signals.shows_speed(items),
     )
+
+
+def _ends(signals_of: Sequence[Array]) -> tuple[float, float]:
+    """Smallest and largest value of a column; equal ends if it has no finite values."""
+    finite = np.concatenate([each[np.isfinite(each)] for each in signals_of])
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
 
 
 def name_of(kind: type[Effect]) -> str:

@@ -17,7 +17,7 @@ from hystgen import effects
 from hystgen.cascade import Cascade
 from hystgen.diagnosis.data.items import Item, everything, rms, thinned
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges, shared
 from hystgen.diagnosis.search.acceptance import apart, is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
@@ -68,9 +68,9 @@ class Refusal:
     `why`: `one_loop` [remaining fraction of the gap], `little` [rms removed], `chance` [p on held-out records],
     `unsure` [p on fitted records], `small` [fraction of the gap], `most` [remaining rms], `above` [remaining rms on
     records of one loop], `given` and `identified` [remaining rms], `few` [fraction of samples], `end` [fraction of the
-    drive range], `grows` [s], `range` [remaining fraction of the gap], `forgets` [remaining rms with hysteresis other
-    than a play sum], `wild` [rms change that the inverse causes in the plain model's output], `other`: another shape
-    was chosen.
+    drive range], `grows` [s], `shared` [fraction of the removed power], `range` [remaining fraction of the gap],
+    `forgets` [remaining rms with hysteresis other than a play sum], `wild` [rms change that the inverse causes in the
+    plain model's output], `other`: another shape was chosen.
     """
 
     why: str
@@ -117,6 +117,13 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         takes_most(each.left, rms(each.without), records.noise) for each in (held, fitted)
     ):
         return Refusal("most", held.left, rms(held.without))
+    if column := shared.column_of(best.fitted):
+        for removed, items in ((held, records.held), (fitted, records.to_fit)):
+            before, after = shared.apart(items, column, (removed.without, removed.errors))
+            power = rms(removed.without) ** 2 - rms(removed.errors) ** 2
+            own = max(rms(before) ** 2 - rms(after) ** 2, 0.0) / max(power, 1e-300)
+            if own < acceptance.OWN_SHARE or difference(before, after) > acceptance.P_SURE:
+                return Refusal("shared", own, acceptance.OWN_SHARE)
     p_value = difference(held.without, held.errors)
     if not at_rest and (by_chance := _by_chance(held, fitted)):
         return by_chance

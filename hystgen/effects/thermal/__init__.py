@@ -1,3 +1,3 @@
 """Gain and offset that follow a temperature."""
 
-SOURCES = {"blocks": ("heat.c", "gain.c", "friction.c")}
+SOURCES = {"blocks": ("heat.c", "friction.c")}

@@ -1,4 +1,4 @@
-"""Temperatures as blocks: gain and offset set by the caller, or following the drive's own heat."""
+"""Gain and offset that follow the drive's own heat, as a block."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import Answer, N, Scalar, inside, jit, zero
+from hystgen.basics.jit import Answer, N, Scalar, jit, zero
 from hystgen.basics.structures import (
     AnyFactor,
     Count,
@@ -52,45 +52,19 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
+from hystgen.effects.thermal.model import HysteresisHeating, OwnHeat, lost_on
 from hystgen.plays.slots import Counts
-
-# ---------------------------------------------------------------- gain.c
-
-
-class GainTable(GainLimits):
-    """Gain and offset per degree above the reference, between two temperatures."""
-
-    per_degree: AnyFactor
-    offset_per_degree: AnyFactor
-    reference: Signal
-    coldest: Signal
-    hottest: Signal
-    bits: FixedUInt8 = note("of a temperature below a code")
-
-
-class GainState(Struct):
-    """A gain with an offset behind it."""
-
-    gain: Narrow
-    inverse: Narrow
-    offset: Signal
-
-
-KIND = BlockKind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
 
 
 @dataclass(frozen=True)
 class Warm(One):
-    """The block of a thermal effect."""
+    """The block of own heat."""
 
-    effect: LoggedThermal | OwnHeat
+    effect: OwnHeat
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
         """Properties of the gain; the C ignores the heat of the present sample."""
         effect = self.effect
-        if isinstance(effect, LoggedThermal):
-            return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
         degree = abs(effect.gain_per_degree) * output + abs(effect.offset_per_degree)
         _, least, largest = reached(effect, *speed)
         warmed = most_at_once(effect, *speed) * degree if emitted else 0.0
@@ -99,7 +73,7 @@ class Warm(One):
 
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
         """Largest move of a drive within `ends` that may be repeated in every step; `span`: of the output."""
-        return math.inf if isinstance(self.effect, LoggedThermal) else farthest(self.effect, ends, span, seconds)
+        return farthest(self.effect, ends, span, seconds)
 
     def grown(self, size: float, margin: Margin) -> float:
         """Largest output for inputs of magnitude up to `size`."""
@@ -108,69 +82,6 @@ class Warm(One):
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest answer of the inverse for outputs up to `asked`."""
         return (asked + margin.span) / LEAST_GAIN
-
-
-def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainTable:
-    """The tables of several gains in floating point."""
-    effects: list[Any] = [one.effect for one in blocks]
-    given = [(*FLOATING.limits, *numbers(each, about.span)) for each in effects]
-    rows = about.reals(given, "temperatures")
-    return GainTable.of(rows, rows.dtype)
-
-
-def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, float, float]:
-    """Constants of a block for an output that spans `span`: rates, reference, and the limits of the temperature.
-
-    Beyond these limits the gain would exceed its own limits, or the offset alone would exceed the span.
-    """
-    ends = [math.inf]
-    if effect.gain_per_degree:
-        ends += [(limit - 1.0) / effect.gain_per_degree for limit in (LEAST_GAIN, LARGEST_GAIN)]
-    if effect.offset_per_degree:
-        ends += [span / effect.offset_per_degree, -span / effect.offset_per_degree]
-    up = min((end for end in ends if end > 0.0), default=math.inf)
-    down = max((end for end in ends if end < 0.0), default=-math.inf)
-    largest = 1e6  # degrees; if the temperature has no effect
-    return (
-        effect.gain_per_degree, effect.offset_per_degree, effect.reference,
-        effect.reference + max(down, -largest), effect.reference + min(up, largest),
-    )
-
-
-def gain_verbs(by: Gains) -> Verbs:
-    """The verbs of a gain in an arithmetic."""
-    times, reciprocal, scaled, given = by.times, by.reciprocal, by.scaled, by.given
-
-    @jit
-    def reset(t: GainTable, s: GainState, j: int) -> None:
-        """Return to the state of the parameter file: gain 1, offset 0."""
-        s.gain[j] = t.one[j]
-        s.inverse[j] = t.one[j]
-        s.offset[j] = zero(t.one[j])
-
-    @jit
-    def heat(t: GainTable, s: GainState, j: int, temperature: Scalar) -> bool:
-        """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
-        asked = given(t, j, temperature)
-        taken = inside(asked, t.coldest[j], t.hottest[j])
-        above = taken - t.reference[j]
-        wanted = t.one[j] + scaled(above, t.per_degree, j)
-        s.offset[j] = scaled(above, t.offset_per_degree, j)
-        s.gain[j] = inside(wanted, t.least[j], t.largest[j])
-        s.inverse[j] = reciprocal(t.one[j], s.gain[j])
-        return bool(s.gain[j] != wanted or taken != asked)
-
-    @jit(inline=True)
-    def solve(t: GainTable, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """The input that gives the output y."""
-        return times(y - s.offset[j], s.inverse[j])
-
-    @jit(inline=True)
-    def absorb(t: GainTable, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
-        """The output for the input x."""
-        return times(x, s.gain[j]) + s.offset[j]
-
-    return Verbs(memory_of(GainState), absorb=absorb, solve=solve, reset=reset, set_temperature=heat)
 
 
 # ---------------------------------------------------------------- heat.c
@@ -538,22 +449,13 @@ class UnevenHeat:
             _, self.depth, self.up = self._heat(before, drive, seconds)
 
 
-ARITHMETIC = Realized(
-    gain_verbs(FLOATING), numbered(KIND, 1, 1), tables, kinds=(KIND,), degrees=lambda t: float(t.reference[0])
-)
 HEAT_ARITHMETIC = Realized(
     heat_verbs(FLOATING, memory_of(HeatMemory), warmed, FLOATING.given, FLOATING.given),
     numbered(HEAT_KIND, 7, 1), heat_tables, kinds=HEAT_KINDS, beside=friction_constants,
 )
 
-GAIN_PART = ChainPart(
-    "gain", "a temperature", Place.GAIN, called("thermal", lambda effect: bool(effect.columns)),
-    lambda effect, *_: Warm(effect), ARITHMETIC, late("thermal"), calls=("set_temperature",),
-    code=("gain",),
-)
-
 HEAT_PART = ChainPart(
-    "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.columns),
+    "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.read),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
     late("thermal", "HEAT_ARITHMETIC"),
     problems=heat_problems, following=UnevenHeat,
@@ -565,6 +467,6 @@ HEAT_PART = ChainPart(
     ),
     code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.friction.n.any())),
 )
-"""Temperatures as parts of the chain: set by the caller, or caused by the drive's own heat."""
+"""A temperature caused by the drive's own heat, as a part of the chain."""
 
-PARTS = (HEAT_PART, GAIN_PART)
+PARTS = (HEAT_PART,)

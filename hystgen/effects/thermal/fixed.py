@@ -1,4 +1,4 @@
-"""Gain and offset behind the plays in fixed point."""
+"""Gain and offset that follow the drive's own heat, in fixed point."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
+from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import inside, jit
 from hystgen.basics.structures import firsts, memory_of
 from hystgen.effects.gains import (
     FIXED,
     GAIN_BITS,
-    LARGEST_GAIN,
-    LEAST_GAIN,
     ONE,
-    RECIPROCAL_ERROR,
+    coded_gain,
     newton_steps,
 )
 from hystgen.effects.kinds import numbered
@@ -26,75 +24,16 @@ from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     FrictionPlay,
     FrictionTable,
-    GainTable,
     HeatMemory,
     HeatState,
     HeatTable,
     HeatTables,
     Warm,
 )
-from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
 
-LINEAR_ERROR = 2.0**-GAIN_BITS
-"""[fraction of the signal] Error of a gain that is linear in a temperature: one product."""
-
-FACTOR_ERROR = 2.0**-MANTISSA_BITS
-"""[fraction of a product] Error of a factor: half its last bit. The reference temperature has the same error."""
-
-TEMPERATURE_BITS = 37
-"""Fraction bits of an internal temperature, so that temperatures up to 512 degC can be multiplied like any signal."""
-
-
 Numbers = tuple[float, float, float, float, float]
-"""Constants of a block, as in `floating.numbers` and `floating.heat_numbers`."""
-
-
-def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> GainTable:
-    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output; `bits`: left shift
-    from a code to a temperature; `degrees`: the largest code. Raises OverflowError if a number does not fit."""
-    found = []
-    whole = 2.0**TEMPERATURE_BITS
-    for per_degree, offset_per_degree, *ends in rows:
-        rates = factor(per_degree * ONE / whole), factor(offset_per_degree * level / whole)
-        limits = (round(min(max(end, -degrees), degrees) * whole) for end in ends)
-        found.append((*FIXED.limits, *rates, *limits, bits))
-    return GainTable.of(found)
-
-
-@dataclass(frozen=True)
-class GainFormats(Coded):
-    """A gain, given by its constants in floating point."""
-
-    one: Warm
-    numbers: Numbers
-
-    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """The gain's properties, for inputs up to `size`."""
-        return linear(self.one.effect, size, at, 2.0 ** -(TEMPERATURE_BITS + 1), 0.0, LEAST_GAIN, LARGEST_GAIN, at.span)
-
-
-def linear(
-    effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
-    largest: float, offset: float,
-) -> CodedGain:
-    """A gain linear in a temperature that is off by `wrong` degrees and changes by `at_once` degrees per sample."""
-    degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
-    there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
-    back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
-    return CodedGain(least, largest, there, back, offset)
-
-
-def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
-    """A gain of a model."""
-    effect: Any = one.effect
-    return GainFormats(one, floating.numbers(effect, about.span))
-
-
-def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> GainTable:
-    """The tables of several gains, made by `tables`."""
-    degrees = about.code_max / 2.0**about.temperature
-    return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
+"""Constants of a block, as in `floating.heat_numbers`."""
 
 
 # ---------------------------------------------------------------- heat.c
@@ -127,7 +66,8 @@ class Heat(Coded):
         warmest, least, largest = floating.reached(effect, *speed)
         offset = warmest * abs(effect.offset_per_degree) / at.output_lsb
         at_once = floating.most_at_once(effect, *speed)
-        return linear(effect, size, at, wrong, at_once, least, largest, offset)
+        rates = effect.gain_per_degree, effect.offset_per_degree
+        return coded_gain(rates, size, at, wrong, at_once, least, largest, offset)
 
 
 def heat(
@@ -198,10 +138,6 @@ def narrowed(t: HeatTable, j: int, gain: int) -> int:
 STATE_BITS = 31
 """Bits of a rubbing play, excluding its sign; a drive takes 15 or 31 of them."""
 
-ARITHMETIC = Realized(
-    floating.gain_verbs(FIXED), numbered(floating.KIND, 2, 2), made, formats, kinds=(floating.KIND,),
-    degrees=lambda t: float(t.reference[0]) / 2.0**TEMPERATURE_BITS,
-)
 HEAT_ARITHMETIC = Realized(
     floating.heat_verbs(FIXED, memory_of(HeatMemory), warmed, narrowed, FIXED.given),
     numbered(floating.HEAT_KIND, 12, 2), lambda rows, _: heat_tables(rows), heat_formats, floating.HEAT_KINDS,

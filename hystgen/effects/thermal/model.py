@@ -13,8 +13,7 @@ from pydantic import Field
 from hystgen.basics.jit import jit
 from hystgen.basics.quantities import NotNegative, Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, follow, span
-
-COLUMN = "temperature"
+from hystgen.effects.columns import TEMPERATURE, Follower, Law
 
 SELF_HEATING = "thermal, self-heating"
 
@@ -106,24 +105,28 @@ class _Thermal(Effect):
         return self.offset_per_degree * self.above(run)
 
 
-class LoggedThermal(_Thermal):
+class LoggedThermal(_Thermal, Follower):
     """Gain `1 + g (T - T_ref)` and offset `o (T - T_ref)` from a temperature in the record's column `temperature`."""
 
     source: Literal["logged"] = Field(default="logged", description="temperature from the column `temperature`")
 
     timed: ClassVar[bool] = False
-    columns: ClassVar[tuple[str, ...]] = (COLUMN,)
-    compensated: ClassVar[Compensated] = "needs a sensor"
+    columns: ClassVar[tuple[str, ...]] = (TEMPERATURE,)
     compensation: ClassVar[str] = "exact, given the temperature along with the reference"
+
+    @property
+    def law(self) -> Law:
+        """What the temperature does."""
+        return Law(TEMPERATURE, self.gain_per_degree, self.offset_per_degree, self.reference)
 
     def above(self, run: Run) -> Array:
         """The logged temperature above the reference."""
-        return run.extra[COLUMN] - self.reference
+        return self.law.above(run)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """Gain, offset, both; no candidates unless every record has a temperature."""
-        if COLUMN not in about.columns:
+        if TEMPERATURE not in about.columns:
             return []
         found = []
         for what, row in (("gain", (0, None)), ("offset", (None, 0)), ("gain and offset", (0, 1))):

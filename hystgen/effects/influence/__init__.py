@@ -1,0 +1,3 @@
+"""Gain and offset that follow a logged column: load, humidity, another axis."""
+
+SOURCES = {"blocks": ("gain.c", "course.c")}
