@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
     from hystgen.compensator.converter import CodeConversion
+    from hystgen.compensator.health import Watch
     from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
@@ -416,7 +417,8 @@ class UnitTexts:
 @dataclass(frozen=True)
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain;
-    `conversion`: None unless the inverse has converters."""
+    `conversion`: None unless the inverse has converters; `watch`: None unless the C watches the model's
+    error."""
 
     model: Model
     options: Options
@@ -428,6 +430,7 @@ class EmittedModel:
     compiled: Compiled | None
     glue: Glue | None
     conversion: CodeConversion | None = None
+    watch: Watch | None = None
 
     @cached_property
     def measured(self) -> Measured | None:
