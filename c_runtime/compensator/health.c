@@ -45,7 +45,7 @@ unsigned int hystgen_health_update(hystgen_health_t *self, hystgen_real_t expect
     self->left = HYSTGEN_HEALTH_WINDOW;
 #ifdef HYSTGEN_FIXED
     const int32_t mean = (int32_t)(sum >> HYSTGEN_HEALTH_BITS);
-    const int64_t mean_square = squares >> HYSTGEN_HEALTH_BITS;
+    const int64_t mean_square = squares; /* HYSTGEN_HEALTH_SQUARE_LSB divides by the window */
     const bool centred = mean >= -HYSTGEN_HEALTH_MEAN_MOST && mean <= HYSTGEN_HEALTH_MEAN_MOST;
 #else
     const hystgen_real_t mean = sum * HYSTGEN_HEALTH_SHARE;

@@ -186,7 +186,7 @@ class FixedWatch(Watch):
         self._bits = band.window.bit_length() - 1
         self._shift = max(0, -(-(2 * (bits + 1 - self._halved) + self._bits - 62) // 2))
         self.mean_lsb = lsb * 2**self._halved
-        self.square_lsb = (self.mean_lsb * 2**self._shift) ** 2
+        self.square_lsb = (self.mean_lsb * 2**self._shift) ** 2 / band.window
         self._mean = math.ceil((band.mean + lsb) / self.mean_lsb)
         self._square = math.ceil((band.rms + lsb) ** 2 / self.square_lsb)
         if self._mean >= 2**31 or self._square >= 2**62:
@@ -202,7 +202,7 @@ class FixedWatch(Watch):
 
     def _windows(self, error: Values) -> tuple[Values, Values]:
         part = error.astype(np.int64) >> self._shift
-        return error.astype(np.int64).sum(axis=1) >> self._bits, (part * part).sum(axis=1) >> self._bits
+        return error.astype(np.int64).sum(axis=1) >> self._bits, (part * part).sum(axis=1)
 
     def _inside(self, mean: Values, square: Values) -> NDArray[np.bool_]:
         return np.asarray((np.abs(mean) <= self._mean) & (square <= self._square))

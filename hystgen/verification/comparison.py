@@ -99,17 +99,20 @@ def expected_health(real: np.dtype[np.number], watch: Watch, lsb: float, length:
     """Displacements with errors around the band and far beyond it, with the results of the bit-exact reference; `lsb`:
     output units per number."""
     expected, measured = signals.displacements(real, watch.band, lsb, length)
-    names = ("status", "mean", "mean_square")
-    return ExpectedHealth(
-        expected, measured, dict(zip(names, watch.update(expected, measured), strict=True))
-    )
+    own = (real, real) if real.kind == "f" else (np.dtype("int32"), np.dtype("int64"))
+    names, kinds = ("status", "mean", "mean_square"), (np.dtype("uint32"), *own)
+    answers = watch.update(expected, measured)
+    results = {name: each.astype(kind) for name, kind, each in zip(names, kinds, answers, strict=True)}
+    return ExpectedHealth(expected, measured, results)
 
 
 def compare_health(
-    run: Callable[[NDArray[np.number], NDArray[np.number]], Sequence[NDArray[np.number]]], expected: ExpectedHealth
+    run: Callable[..., Sequence[NDArray[np.number]]], expected: ExpectedHealth
 ) -> Mismatch:
-    """Compare the compiled results of a watch over the model's error, bit for bit."""
-    return _compare_results(run(expected.expected, expected.measured), expected.results)
+    """Compare the compiled results of a watch over the model's error, bit for bit; `run`: takes expected and measured
+    displacements and the types of the results."""
+    kinds = [each.dtype for each in expected.results.values()]
+    return _compare_results(run(expected.expected, expected.measured, kinds), expected.results)
 
 
 def compare_codes(

@@ -78,11 +78,11 @@ class _Library:
         )
         return found
 
-    def health(self, expected: NDArray[np.number], measured: NDArray[np.number]) -> list[NDArray[np.number]]:
-        """The harness's results for displacements: status, mean and mean square after each sample."""
-        whole = expected.dtype.kind == "i"
-        kinds = ("uint32", *(("int32", "int64") if whole else (expected.dtype,) * 2))
-        found: list[NDArray[np.number]] = [np.zeros(len(expected), dtype=kind) for kind in kinds]
+    def health(
+        self, expected: NDArray[np.number], measured: NDArray[np.number], kinds: Sequence[np.dtype[np.number]]
+    ) -> list[NDArray[np.number]]:
+        """The harness's results, of these types, for a watch over the model's error."""
+        found = [np.zeros(len(expected), dtype=kind) for kind in kinds]
         self._lib.hystgen_harness_health(
             *(self._ffi.cast("void *", each.ctypes.data) for each in (expected, measured, *found)), len(expected)
         )

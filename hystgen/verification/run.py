@@ -91,7 +91,7 @@ def verify(
         return None if conversion is None else expected_codes(numbers, real, conversion, min(length, CODES))
 
     @functools.cache
-    def watched() -> ExpectedHealth | None:
+    def watched(length: int) -> ExpectedHealth | None:
         if not health:
             return None
         watch = model.watch(options.arithmetic, options.engine, bool(options.left_out))
@@ -106,7 +106,7 @@ def verify(
             begun = time.perf_counter()
             if target is None:
                 wanted = functools.partial(records, length)
-                found = host.rows(written, wanted, real, compiler, folder, progress, codes(), watched())
+                found = host.rows(written, wanted, real, compiler, folder, progress, codes(), watched(length))
                 report.rows.extend(_timed(begun, found))
             elif isinstance(target, Board):
                 memory = module.of(model, options).cost.avr
@@ -114,7 +114,9 @@ def verify(
                 report.rows.extend(_timed(begun, avr.rows(target, written, size, compiler, folder, progress)))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
-                report.rows.extend(_timed(begun, cores.rows(target, written, wanted, compiler, folder, progress)))
+                checked = watched(target_length or target.calls)
+                found = cores.rows(target, written, wanted, compiler, folder, progress, checked)
+                report.rows.extend(_timed(begun, found))
     return report
 
 
