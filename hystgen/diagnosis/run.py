@@ -368,12 +368,9 @@ def _signals(ready: Prepared, found: Outcome) -> tuple[Signals, ...]:
 
 def _with_residual(parameters: Parameters, found: Outcome, ready: Prepared) -> Parameters:
     """The parameters with the error that the model leaves on held-out records."""
-    from hystgen.parameters.schema import Residual
-
     timed = all(item.timed for item in ready.held)
-    steps = [float(np.median(np.diff(item.run.t))) for item in ready.held]
-    numbers = quality.residual(found.fitted.errors(ready.held), steps) if timed else None
-    return parameters.model_copy(update={"residual": Residual(**numbers) if numbers else None})
+    step = min(float(np.median(np.diff(item.run.t))) for item in ready.held) if timed else None
+    return parameters.model_copy(update={"residual": quality.residual(found.fitted.errors(ready.held), step)})
 
 
 def _extended(

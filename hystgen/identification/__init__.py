@@ -214,7 +214,9 @@ def identify(
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     step = next((rounded(record.sample_time, STEP_DIGITS) for record in fit_records if record.timed), None)
-    parameters = _parameters(name, units, step, drive, fitted, offset, compared[0], _residual(held_errors, read))
+    parameters = _parameters(name, units, step, drive, fitted, offset, compared[0])
+    judged = [each.error for each in held_errors or errors]
+    parameters = parameters.model_copy(update={"residual": quality.residual(judged, step)})
     said = verdict.verdict(errors, held_errors, quality.wrong_way(fitted), (units or {}).get("output", ""))
     if strict and said.useless:
         raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")
@@ -471,13 +473,6 @@ def _parted(item: Course) -> tuple[Course, Course]:
     return replace(item, y=y), replace(item, begin=max(stop - number, item.begin), last=stop)
 
 
-def _residual(errors: Sequence[pi.FreeRunErrors], read: Sequence[Record]) -> dict[str, float] | None:
-    """The held-out error as a parameter file states it; None if nothing was held out or records have no times."""
-    found = {record.name: record for record in read}
-    known = [(each.error, record) for each in errors if (record := found.get(each.course.name)) and record.timed]
-    return quality.residual([error for error, _ in known], [record.sample_time for _, record in known])
-
-
 def _parameters(
     name: str,
     units: Mapping[str, str] | None,
@@ -486,7 +481,6 @@ def _parameters(
     fitted: FittedModel,
     offset: float,
     first: Course,
-    residual: Mapping[str, float] | None,
 ) -> Parameters:
     from hystgen.parameters.files import make_parameters
 
@@ -511,8 +505,6 @@ def _parameters(
     if fitted.parallel is not None:
         described["effects"] = [fitted.parallel.model_dump(exclude_defaults=True)]
     content["model"] = described
-    if residual:
-        content["residual"] = residual
     return make_parameters(content)
 
 

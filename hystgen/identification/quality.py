@@ -16,6 +16,7 @@ from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import FreeRunErrors, Weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.start import STARTS, UNLIKE
+from hystgen.parameters.schema import Residual
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -261,10 +262,6 @@ def block_length(errors: Sequence[Array]) -> int:
     return int(min(max(shortest, round(MEMORY * sum(times) / samples)), longest))
 
 
-RESIDUAL_DIGITS = 4
-"""Significant digits of the residual in a parameter file, more than records determine."""
-
-
 def correlation_time(e: Array) -> float:
     """`1 + 2 sum rho_k` in samples, over the initial positive sequence (Geyer, Statistical Science 7, 1992)."""
     n = len(e)
@@ -278,21 +275,19 @@ def correlation_time(e: Array) -> float:
     return float(max(1.0, 1.0 + 2.0 * np.sum(pairs[: ends[0] if len(ends) else len(pairs)])))
 
 
-def residual(errors: Sequence[Array], seconds: Sequence[float]) -> dict[str, float] | None:
-    """Entry `residual` of a parameter file for held-out errors, each with its sample time in s; None without an error.
+def residual(errors: Sequence[Array], step: float | None) -> Residual | None:
+    """What a parameter file says about a fit's errors, NaN where not compared; `step`: sample time in s.
 
-    The error counts as independent after the longer of two correlation times, its own and that of its square: the
-    latter is long where an error is large only in some places.
-    """
+    None without a time or an error."""
     known = [e[np.isfinite(e)] for e in errors]
-    rms = math.sqrt(sum(float(e @ e) for e in known) / max(sum(map(len, known)), 1))
-    times = [max(correlation_time(e), correlation_time(e**2)) for e in known]
-    independent = sum(len(e) / time for e, time in zip(known, times, strict=True))
-    lasts = sum(len(e) * step for e, step in zip(known, seconds, strict=True))
-    if not (rms > 0.0 and independent >= 1.0 and lasts > 0.0):
+    squares, samples = float(sum(np.sum(e**2) for e in known)), sum(map(len, known))
+    if step is None or not squares > 0.0:
         return None
-    numbers = {"rms": rms, "correlation": lasts / independent, "samples": independent}
-    return {key: float(f"{number:.{RESIDUAL_DIGITS}g}") for key, number in numbers.items()}
+    tau = sum(max(correlation_time(e), correlation_time(e**2)) * len(e) for e in known) / samples
+    return Residual(
+        rms=pi.rounded(math.sqrt(squares / samples), pi.DIGITS), correlation=pi.rounded(tau * step, pi.DIGITS),
+        samples=pi.rounded(max(samples / tau, 1.0), pi.DIGITS),
+    )
 
 
 def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple[float, float]:

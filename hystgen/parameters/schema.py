@@ -364,7 +364,7 @@ class Parameters(_Part):
     model: ModelParameters = Field(description="what the actuator does")
     emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
     residual: Residual | None = Field(
-        default=None, description="error that identification left, from which --health derives its bands"
+        default=None, description="error that identification left, with which monitor and --health compare later ones"
     )
     not_separable: tuple[tuple[str, str], ...] = Field(
         default=(), description="pairs of an effect that a diagnosis named and one that the records leave possible"
