@@ -46,6 +46,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "converter": schema.Converters,
     "reference": schema.Converter,
     "drive": schema.Converter,
+    "residual": schema.Residual,
 }
 
 _PLACES: dict[str, type[BaseModel]] = {

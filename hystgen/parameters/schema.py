@@ -288,6 +288,14 @@ class Converters(_Part):
     drive: Converter = Field(description="destination of drives: input units")
 
 
+class Residual(_Part):
+    """Error of the identified model on records that took no part in the fit."""
+
+    rms: Positive = Field(description="rms error, output units")
+    correlation: Positive = Field(description="time in s over which the error or its square stays correlated")
+    samples: Annotated[float, Field(ge=1.0)] = Field(description="number of independent samples of the error")
+
+
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
 
@@ -338,6 +346,9 @@ class Parameters(_Part):
     )
     model: ModelParameters = Field(description="what the actuator does")
     emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
+    residual: Residual | None = Field(
+        default=None, description="error that identification left, with which monitor compares sessions"
+    )
     not_separable: tuple[tuple[str, str], ...] = Field(
         default=(), description="pairs of an effect that a diagnosis named and one that the records leave possible"
     )
