@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -34,9 +35,9 @@ STROKE = 20.0
 """[um] Motion over the whole range, about."""
 
 CHANGES = ("gain", "creep", "load", "ageing", "cracked", "sensor")
-SIZES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1)
-COUNTS = (1, 2, 4, 8)
-"""Sessions after the change; as many as `BEFORE` come before it."""
+SIZES = (0.01, 0.02, 0.05, 0.1)
+COUNTS = (1, 3, 6)
+"""Sessions after the change, behind `BEFORE` earlier ones."""
 
 BEFORE = 6
 
@@ -192,6 +193,8 @@ def session(
 ) -> Record:
     """A recorded session; `age`: share of a creeping change that has happened."""
     u, step = use(amplitude)
+    ends = np.asarray(model.simulate(np.array([0.0, FULL, 0.0])))
+    u = ends[2] + (ends[1] - ends[2]) * u / STROKE  # what the unit reaches
     v = np.clip(np.asarray(model.inverse().simulate(u)), 0.0, FULL)
     before = np.interp(np.linspace(0.0, 3.0, 120), np.arange(4), [*rng.uniform(0.0, FULL, 3), v[0]])
     y = plant.run(np.concatenate([before, v]))[120:]
@@ -211,11 +214,21 @@ def session(
     return Record(name, t, v, y + noise + drift + rng.uniform(-1.0, 1.0), {"u": u}, step, units={"v": "V", "y": "um"})
 
 
+@functools.cache
+def new(seed: int) -> tuple[Plant, hystgen.Model]:
+    """A new unit and its model, which has an inverse."""
+    rng = np.random.default_rng(seed)
+    while True:
+        plant: Plant = Relays.drawn(rng) if seed % 2 else BoucWen.drawn(rng)
+        model = identified(rng, plant)
+        if not model.cascade.inverse_problems():
+            return plant, model
+
+
 def unit(seed: int, number: int, change: str = "none", size: float = 0.0, after: int = 0) -> tuple[hystgen.Model, list[Record]]:
     """A unit's model and its sessions, the last `after` of which are changed."""
-    rng = np.random.default_rng(seed)
-    plant: Plant = Relays.drawn(rng) if seed % 2 else BoucWen.drawn(rng)
-    model = identified(rng, plant)
+    plant, model = new(seed)
+    rng = np.random.default_rng([seed, 2])
     repeated = bool(seed // 2 % 2)
     uses = [references(rng) for _ in range(int(rng.integers(1, 3)))] if repeated else []
     amplitudes = [rng.uniform(0.6, 1.0) for _ in uses]
@@ -258,7 +271,7 @@ def replace_residual(model: hystgen.Model) -> hystgen.Model:
 def changes(seed: int) -> Iterator[dict[str, object]]:
     """A unit with every change, size and number of sessions."""
     for change in CHANGES:
-        for size in SIZES[1:]:
+        for size in SIZES:
             model, sessions = unit(seed, BEFORE + max(COUNTS), change, size, max(COUNTS))
             for after in COUNTS:
                 kept = sessions[: BEFORE + after]

@@ -275,9 +275,11 @@ def correlation_time(e: Array) -> float:
     return float(max(1.0, 1.0 + 2.0 * np.sum(pairs[: ends[0] if len(ends) else len(pairs)])))
 
 
-def residual(errors: Sequence[FreeRunErrors], step: float | None) -> Residual | None:
-    """What a parameter file says about a fit's errors; `step`: sample time in s. None without a time or an error."""
-    known = [e[np.isfinite(e)] for e in (each.error for each in errors)]
+def residual(errors: Sequence[Array], step: float | None) -> Residual | None:
+    """What a parameter file says about a fit's errors, NaN where not compared; `step`: sample time in s.
+
+    None without a time or an error."""
+    known = [e[np.isfinite(e)] for e in errors]
     squares, samples = float(sum(np.sum(e**2) for e in known)), sum(map(len, known))
     if step is None or not squares > 0.0:
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, ParamSpec
 
@@ -15,6 +15,7 @@ from hystgen.basics.version import __version__
 from hystgen.report.html import HtmlTable, Listing, Picture, Section, Text, page
 from hystgen.report.viewer import Viewed, Viewer
 from hystgen.service import monitoring
+from hystgen.service.change import amount
 from hystgen.service.monitoring import Monitoring
 from hystgen.service.sessions import DIRECTIONS, Session
 
@@ -50,11 +51,11 @@ def figure(found: Monitoring, width: float = WIDE) -> Figure:
     """Over the sessions: the clearest direction with its band, and the rms errors; below, the deviation over the drive
     before and after the change."""
     drawn = drawing.figure(width, 7.5 if width == WIDE else 10.0)
-    top, below = drawn.subfigures(2, 1, height_ratios=(2.0, 1.2))
+    top, below = drawn.subfigures(2, 1, squeeze=False, height_ratios=(2.0, 1.2))[:, 0]
     first, second = top.subplots(2, 1, sharex=True)
     _over_sessions(first, found)
     _errors(second, found)
-    _deviations(below.subplots(1, 2, sharex=True, sharey=True) if found.first else [below.subplots()], found)
+    _deviations(below.subplots(1, 2 if found.first else 1, sharex=True, sharey=True, squeeze=False)[0], found)
     return drawn
 
 
@@ -66,15 +67,16 @@ def _over_sessions(axes: Axes, found: Monitoring) -> None:
     if not shown:
         return
     k = np.array([k for k, _ in shown])
-    values, sure = (100.0 * np.array([x / s.size for _, s in shown for x in (getattr(s, which),)])
+    scale, unit = (1e3, "ms") if name == "rate" else (100.0, "%")
+    values, sure = (scale * np.array([getattr(each, which) / each.size for _, each in shown])
                     for which in ("part", "sure"))
     axes.errorbar(k, values, 1.96 * sure, fmt="o", color=drawing.MEASURED, markersize=5, linewidth=1.2)
     centre, spread = found.band(name)
-    axes.axhspan(100.0 * (centre - spread), 100.0 * (centre + spread), color=drawing.RESIDUAL, alpha=0.15,
+    axes.axhspan(scale * (centre - spread), scale * (centre + spread), color=drawing.RESIDUAL, alpha=0.15,
                  label=f"healthy sessions, {100.0 * (1.0 - found.false_alarms):.4g} %")
     _mark(axes, found)
     axes.set_title(DIRECTIONS[name][0].upper() + DIRECTIONS[name][1:], fontsize=9, pad=18)
-    axes.set_ylabel("off the model (%)")
+    axes.set_ylabel(f"off the model ({unit})")
     drawing.legend_above(axes, 2)
 
 
@@ -104,7 +106,7 @@ def _mark(axes: Axes, found: Monitoring) -> None:
         axes.axvline(found.first - 0.5, color=drawing.FAULT, linewidth=1.5, label="change")
 
 
-def _deviations(panels: list[Axes], found: Monitoring) -> None:
+def _deviations(panels: Sequence[Axes], found: Monitoring) -> None:
     """Measured minus expected over the drive, of the last session before and of the last since the change."""
     shown = [found.sessions[-1]] if not found.first else [found.sessions[found.first - 1], found.sessions[-1]]
     for axes, session in zip(panels, shown, strict=True):
@@ -174,8 +176,9 @@ def _changes(found: Monitoring) -> list[HtmlTable | Text]:
     for each in found.changes:
         low, high = each.interval
         rows.append([
-            DIRECTIONS[each.direction], found.sessions[each.first].name, f"{100.0 * each.size:+.3g} %",
-            f"{100.0 * low:+.3g} %", f"{100.0 * high:+.3g} %", f"{each.p_value:.2g}", each.against, each.refused,
+            DIRECTIONS[each.direction], found.sessions[each.first].name,
+            *(amount(each.direction, x) for x in (each.size, low, high)), f"{each.p_value:.2g}", each.against,
+            each.refused,
         ])
     explained = (
         "Every direction in which a unit can move away from its model, with the clearest change along it. p is the "

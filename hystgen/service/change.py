@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +36,8 @@ after a change use other drives than those before, that much of the misfit may l
 class Change:
     """A possible change along one direction.
 
-    `first`: index of the first changed session; `size`: change per unit (relative, for gain); `before`: the same of
-    the sessions before; `sure`: standard deviation of `size`; `p_value`: probability of one so clear in a healthy set,
+    `first`: index of the first changed session; `size`: the change (relative; in s for a lag); `worth`: its rms effect
+    on the motion, output units; `sure`: standard deviation of `size`; `p_value`: probability of one so clear in a healthy set,
     over all directions and sessions; `against`: `earlier sessions` or `identification`; `refused`: why it is no
     evidence, although it is clear; empty if it is.
     """
@@ -45,7 +45,7 @@ class Change:
     direction: str
     first: int
     size: float
-    before: float
+    worth: float
     sure: float
     p_value: float
     against: str
@@ -58,7 +58,14 @@ class Change:
 
     def sentence(self) -> str:
         """The change in words."""
-        return f"{DIRECTIONS[self.direction]} changed by {100.0 * self.size:+.2g} % (1 sd {100.0 * self.sure:.1g} %)"
+        low, high = self.interval
+        return f"{DIRECTIONS[self.direction]} changed by {amount(self.direction, self.size)} (95 %: " \
+            f"{amount(self.direction, low)} to {amount(self.direction, high)})"
+
+
+def amount(direction: str, size: float) -> str:
+    """A change along a direction: in s for a lag, else relative."""
+    return f"{1e3 * size:+.3g} ms" if direction == "rate" else f"{100.0 * size:+.3g} %"
 
 
 def largest_residual(stated: Residual | None, false_alarms: float) -> float | None:
@@ -72,7 +79,8 @@ def largest_residual(stated: Residual | None, false_alarms: float) -> float | No
 
 
 def find(sessions: Sequence[Session], residual: float | None, false_alarms: float) -> list[Change]:
-    """Possible changes, the clearest first, at most one per direction and comparison.
+    """Possible changes, at most one per direction and comparison: those that are evidence at this rate first, in the
+    order of their effect on the motion, then the others, the clearest first.
 
     Every direction is tested twice: among the sessions, and against `residual`, the rms residual that identification
     left (output units), if that is known. The smallest p-value counts, times the number of tests (Bonferroni).
@@ -82,13 +90,15 @@ def find(sessions: Sequence[Session], residual: float | None, false_alarms: floa
         found for name in names if (found := _among(sessions, name, residual, false_alarms / len(names))) is not None
     ]
     if residual is not None:
-        made += [_beyond(sessions, name, residual) for name in names]
+        made += [_beyond(sessions, name, residual, false_alarms / len(names)) for name in names]
     tests = len(made)
-    final = [
-        Change(c.direction, c.first, c.size, c.before, c.sure, min(1.0, tests * c.p_value), c.against, c.refused)
-        for c in made
-    ]
-    return sorted(final, key=lambda c: (bool(c.refused), c.p_value, -abs(c.size)))
+    final = [replace(each, p_value=min(1.0, tests * each.p_value)) for each in made]
+
+    def place(each: Change) -> tuple[bool, bool, float]:
+        shown = each.p_value <= false_alarms
+        return bool(each.refused), not shown, -each.worth if shown else each.p_value
+
+    return sorted(final, key=place)
 
 
 def _columns(sessions: Sequence[Session], name: str) -> tuple[Array, Array, Array]:
@@ -139,17 +149,15 @@ def _among(sessions: Sequence[Session], name: str, residual: float | None, rate:
         beyond += int(np.count_nonzero(np.max(squares(random.standard_normal((now, number))), axis=1) >= own[k]))
         left -= now
     change = float((part * root) @ unit[:, k]) / max(float(lengths[k]), 1e-300)
-    w = (size * root)[: k + 1]
-    before = float(w @ (part * root)[: k + 1]) / float(w @ w)
     spread = abs(change) / math.sqrt(float(own[k])) if own[k] > 0.0 else math.inf
-    clear = abs(change) * float(np.sqrt(np.mean(size[k + 1 :] ** 2)))
+    worth = abs(change) * float(np.sqrt(np.mean(size[k + 1 :] ** 2)))
     misfit = residual if residual is not None else float(np.sqrt(np.mean([s.rms**2 for s in sessions[: k + 1]])))
     other = min(1.0, MISFIT_TURNS * _gap(sessions[: k + 1], sessions[k + 1 :])) * misfit
-    refused = "" if clear > other else (
+    refused = "" if worth > other else (
         f"the drives from {sessions[k + 1].name} on differ from those before, which may explain it"
     )
     p = (1 + beyond) / (1 + draws)
-    return Change(name, k + 1, change, before, spread, p, "earlier sessions", refused)
+    return Change(name, k + 1, change, worth, spread, p, "earlier sessions", refused)
 
 
 def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
@@ -162,7 +170,7 @@ def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
     return float(np.max(np.maximum(apart, 0.0) / scale))
 
 
-def _beyond(sessions: Sequence[Session], name: str, residual: float) -> Change:
+def _beyond(sessions: Sequence[Session], name: str, residual: float, rate: float) -> Change:
     """The clearest session whose part along a direction exceeds the whole residual of identification.
 
     A healthy unit's model misses no more in service than it did on the records it was fitted to, so a part is evidence
@@ -172,10 +180,8 @@ def _beyond(sessions: Sequence[Session], name: str, residual: float) -> Change:
 
     size, part, sure = _columns(sessions, name)
     p = 2.0 * ndtr(-np.maximum(np.abs(part) - residual, 0.0) / np.maximum(sure, 1e-300))
-    best = float(np.min(p))
-    first = int(np.argmax(p <= max(best, 1e-6)))
-    k = first if p[first] <= best or p[first] < 1e-6 else int(np.argmin(p))
+    best = min(1.0, len(part) * float(np.min(p)))
+    k = int(np.argmax(len(part) * p <= max(best, rate)))
     change = float(size[k:] @ part[k:]) / float(size[k:] @ size[k:])
-    return Change(
-        name, k, change, 0.0, float(sure[k] / size[k]), min(1.0, len(part) * best), "identification"
-    )
+    worth = abs(change) * float(np.sqrt(np.mean(size[k:] ** 2)))
+    return Change(name, k, change, worth, float(np.max(sure[k:] / size[k:])), best, "identification")

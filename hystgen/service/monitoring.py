@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from hystgen.basics import arguments, display, drawing
+from hystgen.basics import arguments, display, drawing, parallel
 from hystgen.basics.problems import RecordError, counted
 from hystgen.diagnosis import run
+from hystgen.diagnosis.findings.result import plain
 from hystgen.diagnosis.search import selection
 from hystgen.effects.base import Effect
 from hystgen.identification.fit import visited
@@ -46,6 +47,11 @@ MORE_MATTERS = 0.1
 between references."""
 
 
+REFITTED = 0.8
+"""[fraction of the residual] Other weights that leave less than this explain a part of the change: the third of its
+power that then goes is far more than free weights take from noise."""
+
+
 class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -55,7 +61,7 @@ class ChangeEntry(_Entry):
 
     direction: Literal["gain", "loop", "curve", "rate", "slow"]
     since: str = Field(description="first session that shows it")
-    size: float = Field(description="relative change; against identification, distance from the model")
+    size: float = Field(description="relative, in s for rate; against identification, distance from the model")
     interval: tuple[float, float] = Field(description="95 % interval of size")
     p_value: float = Field(description="chance of one so clear in a healthy set, over all directions and sessions")
     against: Literal["earlier sessions", "identification"]
@@ -143,13 +149,13 @@ class Monitoring:
 
     @property
     def clearest(self) -> Change | None:
-        """The clearest change that is evidence."""
+        """The change with the largest effect among those that are evidence, else the clearest."""
         return next((each for each in self.changes if not each.refused), None)
 
     @property
     def p_value(self) -> float:
         """Chance of a change so clear in a healthy set of sessions."""
-        return 1.0 if self.clearest is None else self.clearest.p_value
+        return min((each.p_value for each in self.changes if not each.refused), default=1.0)
 
     @property
     def alarm(self) -> bool:
@@ -207,10 +213,10 @@ class Monitoring:
             size = float(np.median([each.size for each in found]))
             return 0.0, self.residual / size
         then = found[: self.first] or found
-        size, part, sure = (np.array([getattr(each, k) for each in then]) for k in ("size", "part", "sure"))
-        centre = float(size @ part / (size @ size))
-        scatter = math.sqrt(max(float(np.mean((part - centre * size) ** 2)), float(np.mean(sure**2))))
-        return centre, NormalDist().inv_cdf(1.0 - 0.5 * self.false_alarms) * scatter / float(np.median(size))
+        sizes, part, sure = (np.array([getattr(each, k) for each in then]) for k in ("size", "part", "sure"))
+        centre = float(sizes @ part / (sizes @ sizes))
+        scatter = math.sqrt(max(float(np.mean((part - centre * sizes) ** 2)), float(np.mean(sure**2))))
+        return centre, NormalDist().inv_cdf(1.0 - 0.5 * self.false_alarms) * scatter / float(np.median(sizes))
 
     def sentence(self) -> str:
         """The judgement in a few sentences."""
@@ -358,7 +364,8 @@ def monitor(
     model.chain.require_columns([model.run(each.v, each.t, each.extra) for each in ordered])
     before = None if history is None else visited(history)
     fitted = selection.as_given(model.cascade, model.effects)
-    found, notes = sessions.compared(ordered, fitted, before, rest, skip)
+    with parallel.one_thread():
+        found, notes = sessions.compared(ordered, fitted, before, rest, skip)
     residual = change.largest_residual(model.parameters.residual, false_alarms)
     if residual is None and len(found) < FEWEST:
         raise RecordError([
@@ -380,36 +387,39 @@ def monitor(
 def _cause(
     found: Monitoring, history: Sequence[float] | None, rest: float, skip: float, effects: Sequence[type[Effect]]
 ) -> tuple[tuple[EffectEntry, ...], str]:
-    """Effects that the diagnosis names since the change and not before, and what it says."""
+    """Effects that the diagnosis names since the change, and what it says.
 
-    def diagnosed(group: Sequence[Session]) -> Diagnosis | None:
+    The model is first brought up to date with the sessions before the change, effects included, so that what it lacked
+    from the beginning is not taken for the change.
+    """
+
+    def diagnosed(model: Model, group: Sequence[Session]) -> Diagnosis | None:
         try:
             records: list[Record] = [each.record for each in group]
-            return run.diagnose(found.model, records, history=history, rest=rest, skip=skip, effects=effects)
+            return run.diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)
         except (IdentificationError, RecordError):
             return None
 
-    now = diagnosed(found.now)
+    then = diagnosed(found.model, found.sessions[: found.first]) if found.first else None
+    known = found.model if then is None else then.model
+    now = diagnosed(known, found.now)
     if now is None:
         return (), "The sessions since then are too short for a diagnosis."
     named = [each for each in now.result.effects if each.unsupported is None]
-    if named and found.first:
-        then = diagnosed(found.sessions[: found.first])
-        there = [] if then is None else [each.name for each in then.result.effects]
-        named = [each for each in named if each.name not in there]
-    gap = now.result.gap
     entries = tuple(
         EffectEntry(
-            name=each.name, parameters=dict(each.parameters), share_of_gap=each.share_of_gap, p_value=each.p_value
+            name=each.name, parameters=plain(each.parameters), share_of_gap=each.share_of_gap, p_value=each.p_value
         )
         for each in named
     )
-    u = f" {now.result.unit}" if now.result.unit else ""
-    refitted = f"with its own parameters refitted, the model leaves {gap.refitted.holdout:.3g}{u} rms of " \
-        f"{gap.as_given.holdout:.3g}{u}"
+    gap, u = now.result.gap, f" {now.result.unit}" if now.result.unit else ""
+    given, refitted, after = (f"{x.holdout:.3g}{u}" for x in (gap.as_given, gap.refitted, gap.after))
+    less = "" if then is None else " that the sessions before give"
+    weights = gap.refitted.holdout < REFITTED * gap.as_given.holdout
+    by = f"with other weights the model{less} is off by {refitted} rms, not {given}"
     if named:
         names = " and ".join(each.name for each in named)
-        return entries, f"The diagnosis names {names}: {refitted}, and with {names} {gap.after.holdout:.3g}{u}."
-    if gap.refitted.holdout < math.sqrt(0.5) * gap.as_given.holdout:
-        return (), f"The diagnosis names no effect: {refitted}, so the weights have changed."
-    return (), f"The diagnosis names no effect: {refitted}. {now.sentence()}"
+        return entries, f"The diagnosis names {names}: {by if weights else f'from {refitted} rms'}, with it {after}."
+    if weights:
+        return (), f"The diagnosis names no effect, but the weights have changed: {by}."
+    return (), f"The diagnosis names no effect: {now.sentence()}"

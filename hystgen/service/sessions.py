@@ -133,7 +133,7 @@ class Session:
             "curve": (y - 0.5 * (float(y.max()) + float(y.min()))) ** 2 / half,
         }
         if self.item.timed:
-            found |= {"rate": np.gradient(y, t) * (float(np.ptp(t)) / len(t)), "slow": _slow(y, t)}
+            found |= {"rate": -np.gradient(y, t), "slow": _slow(y, t)}
         steady = {name: self._steady(x) for name, x in found.items()}
         return {name: x for name, x in steady.items() if _rms(x) > COLLINEAR * _rms(found[name] - np.mean(found[name]))}
 
