@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from hystgen.report.diagnosis import diagnose as diagnose
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
+    from hystgen.report.monitoring import monitor as monitor
     from hystgen.report.plan import plan as plan
     from hystgen.verification.run import verify as verify
 
@@ -67,6 +68,7 @@ _NAMES = {
     "report.comparison": ("compare",),
     "report.diagnosis": ("diagnose",),
     "report.identification": ("identify", "report_fit"),
+    "report.monitoring": ("monitor",),
     "report.plan": ("plan",),
     "verification.run": ("verify",),
 }

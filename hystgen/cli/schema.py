@@ -1,4 +1,4 @@
-"""`hystgen schema`: the JSON Schemas of the parameter file and of the manifest."""
+"""`hystgen schema`: the JSON Schemas of the parameter file and of what other commands write."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from hystgen.basics import console
 
 @click.command()
 @click.option("--manifest", is_flag=True, help="that of NAME_manifest.json, which emit --manifest writes")
-def schema(manifest: bool) -> None:
+@click.option("--monitor", is_flag=True, help="that of monitor.json, which monitor writes")
+def schema(manifest: bool, monitor: bool) -> None:
     """Print the JSON Schema of the parameter file.
 
     Editors use it if the file begins with  # yaml-language-server: $schema=hystgen.schema.json
@@ -18,7 +19,11 @@ def schema(manifest: bool) -> None:
     """
     import json
 
-    if manifest:
+    if manifest and monitor:
+        raise click.UsageError("--manifest and --monitor are two schemas; give one of them")
+    if monitor:
+        from hystgen.service.monitoring import schema as wanted
+    elif manifest:
         from hystgen.emission.manifest import schema as wanted
     else:
         from hystgen.parameters.schema import schema as wanted
