@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from hystgen.report.identification import report_fit as report_fit
     from hystgen.report.monitoring import monitor as monitor
     from hystgen.report.plan import plan as plan
+    from hystgen.service.learning import refine as refine
     from hystgen.verification.run import verify as verify
 
 # The module of each public name, imported on first use because `hystgen emit` has to start fast. A test checks that it
@@ -70,6 +71,7 @@ _NAMES = {
     "report.identification": ("identify", "report_fit"),
     "report.monitoring": ("monitor",),
     "report.plan": ("plan",),
+    "service.learning": ("refine",),
     "verification.run": ("verify",),
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names}

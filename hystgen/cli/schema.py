@@ -10,7 +10,8 @@ from hystgen.basics import console
 @click.command()
 @click.option("--manifest", is_flag=True, help="that of NAME_manifest.json, which emit --manifest writes")
 @click.option("--monitor", is_flag=True, help="that of monitor.json, which monitor writes")
-def schema(manifest: bool, monitor: bool) -> None:
+@click.option("--refine", is_flag=True, help="that of the JSON that refine writes")
+def schema(manifest: bool, monitor: bool, refine: bool) -> None:
     """Print the JSON Schema of the parameter file.
 
     Editors use it if the file begins with  # yaml-language-server: $schema=hystgen.schema.json
@@ -19,10 +20,12 @@ def schema(manifest: bool, monitor: bool) -> None:
     """
     import json
 
-    if manifest and monitor:
-        raise click.UsageError("--manifest and --monitor are two schemas; give one of them")
+    if manifest + monitor + refine > 1:
+        raise click.UsageError("--manifest, --monitor and --refine are different schemas; give one of them")
     if monitor:
         from hystgen.service.monitoring import schema as wanted
+    elif refine:
+        from hystgen.service.learning import schema as wanted
     elif manifest:
         from hystgen.emission.manifest import schema as wanted
     else:

@@ -1,0 +1,455 @@
+"""Learning from the recorded tracking of a repeated reference: a better model, or a corrected reference.
+
+Iterative learning in the reference: u_(j+1) = u_j + L e_j with e_j = wanted - measured, behind a compensator that is
+left as it is (Bristow, Tharayil, Alleyne, IEEE Control Systems Magazine 26(3), 2006; van Meer et al. 2025 learn the
+remainder of a piezo stepper in the same way). The plant P from reference to displacement is about 1 there, so L is a
+gain and an advance, a Wiener factor that keeps noise out, and a zero-phase low-pass.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from hystgen.basics import arguments, parallel
+from hystgen.basics.problems import counted
+from hystgen.diagnosis.search import selection
+from hystgen.identification.pi import IdentificationError
+from hystgen.model import Model, ModelSource, as_model
+from hystgen.records import Record, RecordError, Source, in_units, read_record, read_records, several, write_atomically
+from hystgen.service import refining, sessions
+
+Array = NDArray[np.float64]
+
+REFERENCE = "u"
+"""The column of the reference that the compensator was given."""
+
+GAMMA = 0.7
+"""[fraction of the error] Largest |1 - L P|, uncertainty included, in the band that is learned: five passes then leave
+0.7^5 = 17 % at worst."""
+
+SURE = 2.0
+"""[standard deviations] Uncertainty of P that is counted: 95 %."""
+
+BANDS = 3
+"""[per octave] Bands in which P and the noise are estimated."""
+
+SAME = 1e-3
+"""[fraction of the reference's range] Two recorded references that differ by less are the same: a 10-bit converter."""
+
+FLAT = 0.75
+"""[fraction of the frequency up to which P is known] L is not attenuated up to here, and falls to 0 above."""
+
+STRONG = 1e-6
+"""[fraction of the power] Lines below this say nothing about gain and delay, and a gain below this is none."""
+
+SCHEMA_ID = "urn:hystgen:refine:1"
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class PassEntry(_Entry):
+    """Repetitions of one reference: rms of wanted minus measured, of their mean and of a single one, and rms of what
+    differs from repetition to repetition; output units."""
+
+    records: tuple[str, ...]
+    rms: float = Field(description="rms of the mean error over the repetitions")
+    noise: float = Field(description="rms by which a repetition differs from their mean")
+    floor: float = Field(description="rms of the mean error that noise alone would leave")
+
+
+class ModelEntry(_Entry):
+    """The refit of the model: rms error of a repetition that took no part in it."""
+
+    accepted: bool
+    before: float | None = None
+    after: float | None = None
+    why: str
+
+
+class CorrectionEntry(_Entry):
+    """The learning filter L, and why it converges."""
+
+    gamma: float = Field(description="largest |1 - L P| in the band, 95 % uncertainty of P included")
+    gamma_beyond: float = Field(description="the same above the band, where L falls to 0; at most 1")
+    band: float = Field(description="Hz; the band that is learned ends here")
+    gain: float = Field(description="of P")
+    delay: float = Field(description="s; of P")
+    expected: float = Field(description="rms error to expect of the next pass, output units")
+    change: float = Field(description="rms by which the correction moves the reference, output units")
+
+
+class Report(_Entry):
+    """What `hystgen refine --json` writes."""
+
+    hystgen: Literal[1] = 1
+    verdict: Literal["model_improved", "reference_corrected", "at_noise_floor", "not_convergent"]
+    unit: str
+    passes: tuple[PassEntry, ...]
+    model: ModelEntry
+    correction: CorrectionEntry | None
+    stop: bool = Field(description="whether a further pass would be of no use")
+    advice: tuple[str, ...]
+
+
+def schema() -> dict[str, object]:
+    """JSON Schema (2020-12) of the report."""
+    made = Report.model_json_schema(mode="serialization")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID, **made}
+
+
+@dataclass(frozen=True)
+class Pass:
+    """R repetitions of one reference of N samples: `given` (N,) to the compensator, `measured` (R, N)."""
+
+    names: tuple[str, ...]
+    given: Array
+    measured: Array
+
+    @property
+    def mean(self) -> Array:
+        """Mean motion (N,)."""
+        return np.asarray(self.measured.mean(axis=0))
+
+    @property
+    def noise(self) -> float:
+        """rms by which a repetition differs from the expected mean, output units."""
+        r = len(self.measured)
+        return float(np.sqrt(np.mean((self.measured - self.mean) ** 2) * r / (r - 1)))
+
+    @property
+    def floor(self) -> float:
+        """rms of the mean that noise alone makes."""
+        return self.noise / math.sqrt(len(self.measured))
+
+
+@dataclass(frozen=True, repr=False)
+class Learned:
+    """What the passes teach. `refined`: the better model, None if none is; `reference`: the corrected reference (N,),
+    None where learning stops; `t`: its times in s."""
+
+    report: Report
+    t: Array = field(compare=False)
+    refined: refining.Refined | None = field(default=None, compare=False)
+    reference: Array | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        return f"<Learned: {self.report.verdict}, rms {self.report.passes[-1].rms:.3g} {self.report.unit}>".rstrip()
+
+    def to_json(self) -> str:
+        """The report as JSON."""
+        return json.dumps(self.report.model_dump(mode="json"), indent=2) + "\n"
+
+    def table(self) -> str:
+        """A line for each pass, then sentences on the model, the correction and what to do next."""
+        u = f" {self.report.unit}".rstrip()
+        lines = [
+            f"pass {k}: rms error {each.rms:.4g}{u} over {counted(len(each.records), 'repetition')}; noise alone would "
+            f"leave {each.floor:.3g}{u}"
+            for k, each in enumerate(self.report.passes, 1)
+        ]
+        lines.append(f"model: {self.report.model.why}")
+        if (c := self.report.correction) is not None:
+            lines.append(
+                f"correction: up to {c.band:.4g} Hz |1 - L P| <= {c.gamma:.2f} < 1, and above it <= "
+                f"{c.gamma_beyond:.2f}, so the error falls by at least this factor a pass until the noise; expected "
+                f"rms error of the next pass {c.expected:.3g}{u}"
+            )
+        return "\n".join([*lines, *self.report.advice])
+
+    def correction_text(self) -> str:
+        """The corrected reference as CSV, columns t and u. Raises ValueError where learning stops."""
+        if self.reference is None:
+            raise ValueError("there is no correction to write: " + " ".join(self.report.advice))
+        text = io.StringIO()
+        rows = csv.writer(text, lineterminator="\n")
+        rows.writerow(["t", REFERENCE])
+        rows.writerows((f"{t:.10g}", f"{u:.10g}") for t, u in zip(self.t, self.reference, strict=True))
+        return text.getvalue()
+
+    def write_correction(self, path: str | os.PathLike[str]) -> None:
+        """Write the corrected reference completely or not at all. Raises ValueError, OSError."""
+        write_atomically(path, self.correction_text())
+
+
+@arguments.checked
+def refine(
+    parameters: ModelSource,
+    records: Source | Iterable[Source],
+    *,
+    reference: Source | None = None,
+    columns: dict[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    history: Sequence[float] | None = None,
+    progress: bool = False,
+) -> Learned:
+    """Learn from the recorded tracking of a repeated reference.
+
+    `records`: one for each repetition, in the order in which they were made, with the reference `u` that the
+    compensator was given, the drive `v` and the measured displacement `y`. `reference`: a record whose column `u` is
+    the wanted motion, if the references given were corrected ones; by default the reference that all records share.
+    At least two repetitions of the last reference are needed, since their difference is the noise. The model is
+    refitted to all repetitions but the last, and taken only if it predicts that one better. Raises RecordError,
+    ParameterError, ValueError, TypeError.
+    """
+    model = as_model(parameters)
+    given = several(records)
+    read = read_records(given, columns, sample_time, delimiter, progress=progress, points=True)
+    read = in_units(read, model.parameters.units, sources=given)
+    own = None
+    if reference is not None:
+        own = reference if isinstance(reference, Record) else read_record(
+            reference, columns=columns, sample_time=sample_time, delimiter=delimiter, need=(REFERENCE,)
+        )
+    wanted = checked(read, own)
+    passes = grouped(read, float(np.ptp(wanted)))
+    t = np.asarray(read[0].t - read[0].t[0])
+    refined, entry = _refitted(model, read, passes[-1].noise, history)
+    return learned(t, wanted, passes, refined, entry, model.parameters.units.output)
+
+
+def checked(read: Sequence[Record], own: Record | None) -> Array:
+    """The wanted motion (N,). Raises RecordError with every problem."""
+    wrong = []
+    first = read[0]
+    step = first.sample_time
+    for each in read:
+        if each.y is None:
+            wrong.append(f"{each.name}: error: column y, the measured displacement, is missing; record it")
+        if REFERENCE not in each.extra:
+            wrong.append(
+                f"{each.name}: error: column {REFERENCE}, the reference that the compensator was given, is missing; "
+                f"record it, or name it with --columns {REFERENCE}=NAME"
+            )
+        if not each.timed:
+            wrong.append(f"{each.name}: error: has no times; add a column t, or give --sample-time")
+        if len(each) != len(first):
+            wrong.append(
+                f"{each.name}: error: has {len(each)} samples and {first.name} has {len(first)}; repetitions have to "
+                "begin and end at the same places, so cut them alike"
+            )
+        elif abs(each.sample_time / step - 1.0) > SAME:
+            wrong.append(f"{each.name}: error: is sampled every {each.sample_time:g} s, not {step:g} s; resample it")
+    if wrong:
+        raise RecordError(wrong)
+    span = float(np.ptp(first.extra[REFERENCE]))
+    if not span > 0.0:
+        raise RecordError([f"{first.name}: error: the reference does not move; give a scan"])
+    if own is not None:
+        wanted = np.asarray(own.extra[REFERENCE] if REFERENCE in own.extra else own.v, dtype=np.float64)
+        if len(wanted) != len(first):
+            raise RecordError([
+                f"{own.name}: error: the wanted reference has {len(wanted)} samples, the records {len(first)}; give "
+                "the one that was corrected, at the same sample time"
+            ])
+        return wanted
+    far = [each for each in read if np.max(np.abs(each.extra[REFERENCE] - first.extra[REFERENCE])) > SAME * span]
+    if far:
+        raise RecordError([
+            f"{each.name}: error: its reference is another one than that of {first.name}; give the wanted one with "
+            "--reference if these are corrections of it, otherwise refine each reference by itself" for each in far
+        ])
+    return np.asarray(first.extra[REFERENCE], dtype=np.float64)
+
+
+def grouped(read: Sequence[Record], span: float) -> list[Pass]:
+    """Consecutive records with one reference. Raises RecordError unless the last one was repeated."""
+    groups: list[list[Record]] = []
+    for each in read:
+        if groups and np.max(np.abs(each.extra[REFERENCE] - groups[-1][0].extra[REFERENCE])) <= SAME * span:
+            groups[-1].append(each)
+        else:
+            groups.append([each])
+    if len(groups[-1]) < 2:
+        raise RecordError([
+            f"{groups[-1][0].name}: error: its reference was recorded once, so noise and error cannot be told apart; "
+            "record the same reference at least twice"
+        ])
+    return [
+        Pass(
+            tuple(each.name for each in group), np.asarray(group[0].extra[REFERENCE], dtype=np.float64),
+            np.array([each.y for each in group], dtype=np.float64),
+        )
+        for group in groups if len(group) > 1
+    ]
+
+
+def _refitted(
+    model: Model, read: Sequence[Record], noise: float, history: Sequence[float] | None
+) -> tuple[refining.Refined | None, ModelEntry]:
+    """The model refitted to all repetitions but the last, if it predicts that one better by more than the power of the
+    `noise` of a repetition."""
+    before = None if history is None else tuple(map(float, history))
+    with parallel.one_thread():
+        old = selection.as_given(model.cascade, model.effects)
+        try:
+            every, _ = sessions.compared(read, old, before, 0.0, 0.0)
+            if len(every) < 2:
+                raise IdentificationError("only one repetition can be compared with the model")
+            held = every[-1]
+            new = refining.refine(model, every[:-1])
+            (judged,), _ = sessions.compared([held.record], selection.as_given(
+                new.model.cascade, new.model.effects), before, 0.0, 0.0)
+        except (IdentificationError, RecordError) as refused:
+            return None, ModelEntry(accepted=False, why=f"kept as it is: {refused}")
+    u = f" {model.parameters.units.output}".rstrip()
+    better = held.rms**2 - judged.rms**2 > SURE * noise**2
+    said = f"held-out rms error {held.rms:.3g}{u} as given, {judged.rms:.3g}{u} refitted"
+    why = f"improved: {said}" if better else f"kept as it is: a refit does not predict a held-out repetition better ({said})"
+    return new if better else None, ModelEntry(accepted=better, before=held.rms, after=judged.rms, why=why)
+
+
+@dataclass(frozen=True)
+class Filter:
+    """L on the frequencies (K,) of a record: `response`, complex, times `wiener` from 0 to 1, which keeps noise out;
+    and P in bands: `plant`, with standard deviation `sure`, both (K,). `band`: Hz up to which L is not attenuated."""
+
+    frequency: Array
+    response: NDArray[np.complex128]
+    wiener: Array
+    plant: NDArray[np.complex128]
+    sure: Array
+    band: float
+    gain: float
+    delay: float
+
+    @property
+    def gamma(self) -> tuple[float, float]:
+        """Largest |1 - L P|, with the uncertainty, in the band and above it.
+
+        The Wiener factor w is left out: |1 - w L P| <= 1 - w + w |1 - L P| lies between the value without it and 1."""
+        size = np.abs(1.0 - self.response * self.plant) + SURE * self.sure * np.abs(self.response)
+        learned = np.abs(self.response) > 0.0
+        inside, beyond = learned & (self.frequency <= self.band), size[learned & (self.frequency > self.band)]
+        return float(size[inside].max(initial=0.0)), float(beyond.max(initial=0.0))
+
+
+def learning_filter(step: float, last: Pass, wanted: Array) -> Filter | None:
+    """The filter for the last pass; None if P is not known well enough at any frequency.
+
+    P is estimated in bands of a third of an octave, by least squares over the lines in each: P = sum Y conj(U) /
+    sum |U|^2. Its uncertainty has the part of Y that U does not explain and the noise between repetitions. The band
+    ends below the first where |1 - P/P0|, with the uncertainty, exceeds GAMMA for the gain and delay P0 that fit best.
+    """
+    n, r = len(wanted), len(last.measured)
+    frequency = np.fft.rfftfreq(n, step)
+    u, y = _lines(last.given), _lines(last.mean)
+    variance = np.sum(np.abs([_lines(each - last.mean) for each in last.measured]) ** 2, axis=0) / (r - 1) / r  # of y
+    edges = frequency[1] * 2.0 ** (np.arange(0, BANDS * math.log2(len(frequency)) + 1) / BANDS)
+    plant, sure = np.zeros(len(frequency), complex), np.full(len(frequency), np.inf)
+    places = np.digitize(frequency, edges)
+    bands = [places == k for k in np.unique(places[1:])]
+    for here in bands:
+        here[0] = False
+        power, lines = float(np.sum(np.abs(u[here]) ** 2)), int(np.count_nonzero(here))
+        if power <= 0.0:
+            continue
+        p = np.sum(y[here] * np.conj(u[here])) / power
+        rest = float(np.sum(np.abs(y[here] - p * u[here]) ** 2)) / max(lines - 1, 1)
+        plant[here], sure[here] = p, math.sqrt(max(rest, float(np.mean(variance[here]))) / power)
+    weight = np.where(np.isfinite(sure), np.abs(u) ** 2, 0.0)
+    strong = weight > STRONG * weight.max()
+    phase = np.angle(np.where(plant == 0.0, 1.0, plant))
+    delay = -float(np.sum((weight * frequency * phase)[strong]) / np.sum((weight * frequency**2)[strong])) / (2 * np.pi)
+    gain = float(np.sum((weight * np.abs(plant))[strong]) / np.sum(weight[strong]))
+    simple = np.exp(2j * np.pi * frequency * delay) / gain  # the inverse of P0
+    size = np.abs(1.0 - simple * plant) + SURE * sure / gain
+    known = np.flatnonzero(strong & (frequency > 0.0))  # between the lines of a periodic reference nothing is known
+    bad = np.flatnonzero(size[known] > GAMMA)
+    known = known[: bad[0]] if len(bad) else known
+    if not len(known):
+        return None
+    last_line = float(frequency[known[-1]])
+    band = FLAT * last_line if len(known) > 1 else last_line
+    falls = np.clip((frequency - band) / max(last_line - band, frequency[1]), 0.0, 1.0)
+    whole = np.where(np.isin(np.arange(len(frequency)), known), np.cos(0.5 * np.pi * falls) ** 2, 0.0) * simple
+    error = _lines(wanted - last.mean)
+    wiener = np.zeros(len(frequency))
+    for here in bands:
+        seen, chance = float(np.sum(np.abs(error[here]) ** 2)), float(np.sum(variance[here]))
+        wiener[here] = max(0.0, 1.0 - chance / seen) if seen > 0.0 else 0.0
+    return Filter(frequency, whole, wiener, plant, np.where(np.isfinite(sure), sure, 0.0), band, gain, delay)
+
+
+def _lines(x: Array) -> NDArray[np.complex128]:
+    """The spectrum of a signal without its mean; a straight line joins its ends, if they differ."""
+    x = x - np.linspace(0.0, float(x[-1] - x[0]), len(x)) * (1.0 - 1.0 / len(x))
+    return np.fft.rfft(x - x.mean())
+
+
+def learned(
+    t: Array, wanted: Array, passes: Sequence[Pass], refined: refining.Refined | None, entry: ModelEntry, unit: str
+) -> Learned:
+    """The judgement of passes: whether to go on, and with which reference."""
+    u = f" {unit}".rstrip()
+    errors = [_centred(wanted - each.mean) for each in passes]
+    entries = tuple(
+        PassEntry(records=each.names, rms=_rms(error), noise=each.noise, floor=each.floor)
+        for each, error in zip(passes, errors, strict=True)
+    )
+    last, advice = passes[-1], list[str]()
+    found = learning_filter(float(t[1] - t[0]), last, wanted)
+    correction = reference = None
+    verdict: Literal["model_improved", "reference_corrected", "at_noise_floor", "not_convergent"]
+    if found is None:
+        verdict = "not_convergent"
+        advice.append(
+            f"No correction: at no frequency do the records show the motion's answer to the reference to {GAMMA:.0%}. "
+            "Record more repetitions, or a pass with a larger or faster reference"
+        )
+    else:
+        move = np.fft.irfft(found.wiener * found.response * np.fft.rfft(errors[-1]), len(wanted))
+        left = np.fft.irfft((1.0 - found.wiener * found.response * found.plant) * np.fft.rfft(errors[-1]), len(wanted))
+        gamma, beyond = found.gamma
+        expected = math.hypot(_rms(left), last.floor) if _rms(move) > 0.0 else _rms(errors[-1])
+        correction = CorrectionEntry(
+            gamma=gamma, gamma_beyond=beyond, band=found.band, gain=found.gain, delay=found.delay,
+            expected=min(expected, _rms(errors[-1])), change=_rms(move),
+        )
+        smaller = _rms(errors[-1]) ** 2 - _rms(left) ** 2
+        if beyond > 1.0 or gamma >= 1.0:
+            verdict = "not_convergent"
+            advice.append("No correction: |1 - L P| exceeds 1 above the band, so passes could diverge")
+        elif smaller <= SURE * last.floor**2 / math.sqrt(len(wanted) / 2.0) + STRONG * _rms(errors[-1]) ** 2:
+            verdict = "at_noise_floor"
+            advice.append(
+                f"Stop: what is left, {_rms(errors[-1]):.3g}{u} rms, is noise in the band up to {found.band:.4g} Hz that "
+                "can be learned; keep this reference. More repetitions a pass would lower the noise"
+            )
+        else:
+            verdict, reference = "reference_corrected", last.given + move
+            advice.append(
+                f"Next: give the compensator the corrected reference, record {counted(len(last.measured), 'repetition')}"
+                ", and refine again with all records and --reference"
+            )
+    if len(errors) > 1 and _rms(errors[-1]) > _rms(errors[-2]) + SURE * math.hypot(last.floor, passes[-2].floor):
+        advice.append("The last pass is worse than the one before it by more than noise: has the stage changed?")
+    if refined is not None:
+        verdict = "model_improved" if reference is None else verdict
+        advice.append("Emit the compensator again with the improved model before learning further")
+    report = Report(
+        verdict=verdict, unit=unit, passes=entries, model=entry, correction=correction, stop=reference is None,
+        advice=tuple(advice),
+    )
+    return Learned(report, t, refined, reference)
+
+
+def _centred(x: Array) -> Array:
+    return np.asarray(x - x.mean())
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))
