@@ -25,14 +25,14 @@ SECONDS, SAMPLES, PASSES = 1e-3, 6000, 5
 
 def stage(seed: int) -> Stage:
     """A stage with every effect of the simulator."""
-    return Stage(seed, SECONDS, mode=(70.0 + 5.0 * (seed % 7), 0.1), noise=0.004, colour=(0.0, 0.6)[seed % 2])
+    return Stage(seed, SECONDS, mode=(160.0 + 10.0 * (seed % 7), 0.1), noise=0.004, colour=(0.0, 0.6)[seed % 2])
 
 
 def raster(low: float, high: float, samples: int = 800) -> Array:
-    """Four periods of a triangle of 5 Hz from `low` to `high`, with rounded turns."""
-    phase = np.arange(samples) * 4.0 / samples
-    x = 0.5 - 0.5 * np.cos(2 * np.pi * phase) + np.cos(6 * np.pi * phase) / -18.0 + 1.0 / 18.0
-    return np.asarray(low + (high - low) * x / x.max())
+    """Four periods of a triangle of 5 Hz from `low` to `high`, whose turns are rounded over 12 ms."""
+    phase = (np.arange(3 * samples) * 4.0 / samples) % 1.0
+    x = np.convolve(1.0 - np.abs(2.0 * phase - 1.0), np.ones(12) / 12.0, "same")[samples : 2 * samples]
+    return np.asarray(low + (high - low) * (x - x.min()) / np.ptp(x))
 
 
 def identified(one: Stage) -> Model:
@@ -43,7 +43,7 @@ def identified(one: Stage) -> Model:
         return hystgen.identify([record], name="m", thresholds=12).model
 
 
-def passes(one: Stage, model: Model, repetitions: int) -> Iterator[Learned]:
+def passes(one: Stage, model: Model, repetitions: int, refit: bool = False) -> Iterator[Learned]:
     """Five passes: each is recorded and then corrected."""
     probe = np.asarray(model.simulate(np.array([2.0, 98.0, 20.0, 80.0])))
     wanted = raster(float(probe[2]), float(probe[3]))
@@ -57,7 +57,7 @@ def passes(one: Stage, model: Model, repetitions: int) -> Iterator[Learned]:
             part = slice(k * len(t), (k + 1) * len(t))
             records.append({"t": t, "v": v[part], "y": y[part], "u": given})
         found = hystgen.refine(
-            model, records, reference={"t": t, "v": wanted, "u": wanted},
+            model, records, reference={"t": t, "v": wanted, "u": wanted}, refit=len(records) == repetitions and refit,
         )
         yield found
         if found.reference is not None:
@@ -80,7 +80,7 @@ def main() -> None:
         print(
             f"stage {seed}: {errors}; noise {last[-1].floor:.4f}; "
             f"{' '.join(each.report.verdict for each in found)}; band {c.band if c else 0:.1f} Hz, "
-            f"gamma {c.gamma if c else 1:.2f}, model {found[0].report.model.why}", flush=True,
+            f"gamma {c.gamma if c else 1:.2f}", flush=True,
         )
 
 

@@ -51,7 +51,7 @@ def refine(
         common.guarded(path, partial(writing.check_writable, path))
     how, visited = common.reading_options(**reading), common.history_values(history)
     found = common.guarded(
-        data[0], lambda: learning.refine(model, data, reference=reference, history=visited, **how)
+        data[0], lambda: learning.refine(model, data, reference=reference, history=visited, refit=bool(output) or not correction, **how)
     )
     if not quiet:
         console.say(found.table())
@@ -63,7 +63,8 @@ def refine(
     if correction and found.reference is not None:
         texts[correction] = found.correction_text()
     elif correction:
-        console.note(f"{correction}: not written, a further pass would be of no use")
+        why = "the improved model comes first" if found.refined else "a further pass would be of no use"
+        console.note(f"{correction}: not written, {why}")
     for path, text in texts.items():
         if path:
             common.guarded(path, partial(writing.write_atomically, path, text))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
 import os
@@ -35,8 +36,8 @@ REFERENCE = "u"
 """The column of the reference that the compensator was given."""
 
 GAMMA = 0.7
-"""[fraction of the error] Largest |1 - L P|, uncertainty included, in the band that is learned: five passes then leave
-0.7^5 = 17 % at worst."""
+"""[fraction of the error] Largest |1 - L P|, uncertainty included, in the band that is known: five passes then leave
+0.7^5 = 17 % at worst. Half of it is for P's distance from its estimate, half for the interpolation between bands."""
 
 SURE = 2.0
 """[standard deviations] Uncertainty of P that is counted: 95 %."""
@@ -44,14 +45,33 @@ SURE = 2.0
 BANDS = 3
 """[per octave] Bands in which P and the noise are estimated."""
 
-SAME = 1e-3
-"""[fraction of the reference's range] Two recorded references that differ by less are the same: a 10-bit converter."""
+SAME = 1e-5
+"""[fraction of the reference's range] Two references that differ by less are the same. They are commanded numbers, so
+only their digits in a file are rounded; a correction is larger. Derived: a 16-bit converter's step is 1.5e-5."""
 
-FLAT = 0.75
-"""[fraction of the frequency up to which P is known] L is not attenuated up to here, and falls to 0 above."""
+STEP = 1e-3
+"""[fraction] Sample times that differ by less are the same."""
+
+TRIED = 0.5
+"""[fraction] Above the frequency up to which P is known, L goes on with half of the gain. The error does not rise there
+while P is within a factor of 2 and 60 degrees of its value below, |1 - 0.5 * 2 exp(j 60 deg)| = 1, and the next pass
+shows P there."""
+
+LEAST_TRIED, MOST_TRIED, BEYOND = 2.0 ** (1 / 3), 3.2, 2.1
+"""[times the last known frequency, the same, times the lowest] L is tried up to the next odd harmonic of a triangle, or
+the next band, unless a mode may double P before: one that explains how far P is from gain and delay at the last known
+frequency, by d, does so at sqrt((1 + d) / (2 d)) times this frequency. Bands further apart than three times, the first
+two harmonics of a triangle, are not interpolated."""
+
+CHANGED = 0.03
+"""[fraction of the largest line] A smaller change of the reference does not show P: the motion also differs between two
+passes because creep goes on."""
+
+ABOVE = 3.0
+"""[times the noise's power] Lines of the error below this are not learned: 5 % of those of noise alone are above."""
 
 STRONG = 1e-6
-"""[fraction of the power] Lines below this say nothing about gain and delay, and a gain below this is none."""
+"""[fraction of the power] Lines below this say nothing about gain and delay, and an improvement below this is none."""
 
 SCHEMA_ID = "urn:hystgen:refine:1"
 
@@ -83,8 +103,8 @@ class CorrectionEntry(_Entry):
     """The learning filter L, and why it converges."""
 
     gamma: float = Field(description="largest |1 - L P| in the band, 95 % uncertainty of P included")
-    gamma_beyond: float = Field(description="the same above the band, where L falls to 0; at most 1")
-    band: float = Field(description="Hz; the band that is learned ends here")
+    band: float = Field(description="Hz up to which the records show P")
+    explored: float = Field(description="Hz up to which L tries half, while P is within a factor 2 and 60 degrees")
     gain: float = Field(description="of P")
     delay: float = Field(description="s; of P")
     expected: float = Field(description="rms error to expect of the next pass, output units")
@@ -122,6 +142,13 @@ class Pass:
     def mean(self) -> Array:
         """Mean motion (N,)."""
         return np.asarray(self.measured.mean(axis=0))
+
+    @property
+    def variance(self) -> Array:
+        """Variance of the lines of the mean's spectrum."""
+        r = len(self.measured)
+        lines = np.abs([_lines(each - self.mean) for each in self.measured]) ** 2
+        return np.asarray(lines.sum(axis=0) / (r - 1) / r)
 
     @property
     def noise(self) -> float:
@@ -163,9 +190,9 @@ class Learned:
         lines.append(f"model: {self.report.model.why}")
         if (c := self.report.correction) is not None:
             lines.append(
-                f"correction: up to {c.band:.4g} Hz |1 - L P| <= {c.gamma:.2f} < 1, and above it <= "
-                f"{c.gamma_beyond:.2f}, so the error falls by at least this factor a pass until the noise; expected "
-                f"rms error of the next pass {c.expected:.3g}{u}"
+                f"correction: up to {c.band:.4g} Hz |1 - L P| <= {c.gamma:.2f} < 1, so the error there falls by at "
+                f"least this factor a pass until the noise; up to {c.explored:.4g} Hz half of it is tried; expected rms "
+                f"error of the next pass {c.expected:.3g}{u}"
             )
         return "\n".join([*lines, *self.report.advice])
 
@@ -194,6 +221,7 @@ def refine(
     sample_time: float | None = None,
     delimiter: str | None = None,
     history: Sequence[float] | None = None,
+    refit: bool = True,
     progress: bool = False,
 ) -> Learned:
     """Learn from the recorded tracking of a repeated reference.
@@ -202,7 +230,8 @@ def refine(
     compensator was given, the drive `v` and the measured displacement `y`. `reference`: a record whose column `u` is
     the wanted motion, if the references given were corrected ones; by default the reference that all records share.
     At least two repetitions of the last reference are needed, since their difference is the noise. The model is
-    refitted to all repetitions but the last, and taken only if it predicts that one better. Raises RecordError,
+    refitted to all repetitions but the last, and taken only if it predicts that one better: then there is no corrected
+    reference, since it would be one for another compensator. `refit=False` leaves the model alone. Raises RecordError,
     ParameterError, ValueError, TypeError.
     """
     model = as_model(parameters)
@@ -217,7 +246,9 @@ def refine(
     wanted = checked(read, own)
     passes = grouped(read, float(np.ptp(wanted)))
     t = np.asarray(read[0].t - read[0].t[0])
-    refined, entry = _refitted(model, read, passes[-1].noise, history)
+    refined, entry = None, ModelEntry(accepted=False, why="kept as it is, as asked")
+    if refit:
+        refined, entry = _refitted(model, read, passes[-1].noise, history)
     return learned(t, wanted, passes, refined, entry, model.parameters.units.output)
 
 
@@ -241,7 +272,7 @@ def checked(read: Sequence[Record], own: Record | None) -> Array:
                 f"{each.name}: error: has {len(each)} samples and {first.name} has {len(first)}; repetitions have to "
                 "begin and end at the same places, so cut them alike"
             )
-        elif abs(each.sample_time / step - 1.0) > SAME:
+        elif abs(each.sample_time / step - 1.0) > STEP:
             wrong.append(f"{each.name}: error: is sampled every {each.sample_time:g} s, not {step:g} s; resample it")
     if wrong:
         raise RecordError(wrong)
@@ -315,7 +346,8 @@ def _refitted(
 @dataclass(frozen=True)
 class Filter:
     """L on the frequencies (K,) of a record: `response`, complex, times `wiener` from 0 to 1, which keeps noise out;
-    and P in bands: `plant`, with standard deviation `sure`, both (K,). `band`: Hz up to which L is not attenuated."""
+    and P, interpolated between the bands in which it is known: `plant`, with standard deviation `sure`, both (K,).
+    `band`: Hz up to which P is known, `explored`: Hz up to which L tries less."""
 
     frequency: Array
     response: NDArray[np.complex128]
@@ -323,70 +355,96 @@ class Filter:
     plant: NDArray[np.complex128]
     sure: Array
     band: float
+    explored: float
     gain: float
     delay: float
 
     @property
-    def gamma(self) -> tuple[float, float]:
-        """Largest |1 - L P|, with the uncertainty, in the band and above it.
+    def gamma(self) -> float:
+        """Largest |1 - L P| in the band, with the uncertainty.
 
         The Wiener factor w is left out: |1 - w L P| <= 1 - w + w |1 - L P| lies between the value without it and 1."""
         size = np.abs(1.0 - self.response * self.plant) + SURE * self.sure * np.abs(self.response)
-        learned = np.abs(self.response) > 0.0
-        inside, beyond = learned & (self.frequency <= self.band), size[learned & (self.frequency > self.band)]
-        return float(size[inside].max(initial=0.0)), float(beyond.max(initial=0.0))
+        return float(size[(self.frequency > 0.0) & (self.frequency <= self.band)].max(initial=0.0))
 
 
-def learning_filter(step: float, last: Pass, wanted: Array) -> Filter | None:
-    """The filter for the last pass; None if P is not known well enough at any frequency.
+def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filter | None:
+    """The filter for the last pass; None if P is not known at any frequency.
 
-    P is estimated in bands of a third of an octave, by least squares over the lines in each: P = sum Y conj(U) /
-    sum |U|^2. Its uncertainty has the part of Y that U does not explain and the noise between repetitions. The band
-    ends below the first where |1 - P/P0|, with the uncertainty, exceeds GAMMA for the gain and delay P0 that fit best.
+    P is estimated in bands of a third of an octave by least squares over the lines in each, P = sum Y conj(X) /
+    sum |X|^2, with the part of Y that X does not explain and the noise between repetitions as uncertainty. X and Y are
+    the difference between two passes where that is sure enough, since whatever the compensator leaves of the hysteresis
+    cancels in it; otherwise reference and motion of the last pass, where they agree with the gain and delay of the
+    whole, P0, well enough for the rest to be hysteresis or noise. In known bands L = 1/P, and somewhat above
+    them TRIED/P, so that the next pass shows P there.
     """
-    n, r = len(wanted), len(last.measured)
-    frequency = np.fft.rfftfreq(n, step)
-    u, y = _lines(last.given), _lines(last.mean)
-    variance = np.sum(np.abs([_lines(each - last.mean) for each in last.measured]) ** 2, axis=0) / (r - 1) / r  # of y
+    last, frequency = passes[-1], np.fft.rfftfreq(len(wanted), step)
+    u, y, variance = _lines(last.given), _lines(last.mean), last.variance
+    moved = [
+        (_lines(b.given - a.given), _lines(b.mean - a.mean), a.variance + b.variance)
+        for a, b in itertools.pairwise(passes)
+    ]
     edges = frequency[1] * 2.0 ** (np.arange(0, BANDS * math.log2(len(frequency)) + 1) / BANDS)
-    plant, sure = np.zeros(len(frequency), complex), np.full(len(frequency), np.inf)
     places = np.digitize(frequency, edges)
-    bands = [places == k for k in np.unique(places[1:])]
+    bands = [np.flatnonzero(places == k) for k in np.unique(places[1:])]
+    weight = np.abs(u) ** 2
+    weight[weight < STRONG * weight.max()] = 0.0
+    phase = np.angle(np.where(weight > 0.0, y / np.where(weight > 0.0, u, 1.0), 1.0))
+    delay = -float(np.sum(weight * frequency * phase) / np.sum(weight * frequency**2)) / (2.0 * np.pi)
+    gain = float(np.sum(np.abs(y) * np.sqrt(weight)) / np.sum(weight))
+    simple = gain * np.exp(-2j * np.pi * frequency * delay)
+    known: list[tuple[int, complex, float]] = []
     for here in bands:
-        here[0] = False
-        power, lines = float(np.sum(np.abs(u[here]) ** 2)), int(np.count_nonzero(here))
-        if power <= 0.0:
-            continue
-        p = np.sum(y[here] * np.conj(u[here])) / power
-        rest = float(np.sum(np.abs(y[here] - p * u[here]) ** 2)) / max(lines - 1, 1)
-        plant[here], sure[here] = p, math.sqrt(max(rest, float(np.mean(variance[here]))) / power)
-    weight = np.where(np.isfinite(sure), np.abs(u) ** 2, 0.0)
-    strong = weight > STRONG * weight.max()
-    phase = np.angle(np.where(plant == 0.0, 1.0, plant))
-    delay = -float(np.sum((weight * frequency * phase)[strong]) / np.sum((weight * frequency**2)[strong])) / (2 * np.pi)
-    gain = float(np.sum((weight * np.abs(plant))[strong]) / np.sum(weight[strong]))
-    simple = np.exp(2j * np.pi * frequency * delay) / gain  # the inverse of P0
-    size = np.abs(1.0 - simple * plant) + SURE * sure / gain
-    known = np.flatnonzero(strong & (frequency > 0.0))  # between the lines of a periodic reference nothing is known
-    bad = np.flatnonzero(size[known] > GAMMA)
-    known = known[: bad[0]] if len(bad) else known
-    if not len(known):
+        found = [
+            each for x, z, chance in moved
+            if np.max(np.abs(x[here])) > CHANGED * np.max(np.abs(x)) and (each := _ratio(x[here], z[here], chance[here]))
+        ]
+        found = [each for each in found if SURE * each[1] < 0.5 * GAMMA * abs(each[0])]
+        centre = here[np.argmax(weight[here])] if weight[here].any() else here[len(here) // 2]
+        if not found and weight[here].any() and (own := _ratio(u[here], y[here], variance[here])):
+            if abs(own[0] / simple[centre] - 1.0) + SURE * own[1] / gain < 0.5 * GAMMA:
+                found = [own]
+        if found and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
+            best = min(found, key=lambda each: each[1] / abs(each[0]))
+            if abs(best[0] / simple[centre] - 1.0) + SURE * best[1] / gain > GAMMA:
+                break  # a mode: what hysteresis makes of lower lines is amplified there, and P is not what it seems
+            known.append((int(centre), *best))
+    if not known:
         return None
-    last_line = float(frequency[known[-1]])
-    band = FLAT * last_line if len(known) > 1 else last_line
-    falls = np.clip((frequency - band) / max(last_line - band, frequency[1]), 0.0, 1.0)
-    whole = np.where(np.isin(np.arange(len(frequency)), known), np.cos(0.5 * np.pi * falls) ** 2, 0.0) * simple
-    error = _lines(wanted - last.mean)
-    wiener = np.zeros(len(frequency))
+    at, inside = [k for k, *_ in known], np.arange(len(frequency))
+    # interpolated relative to gain and delay, whose phase turns between the bands
+    relative = np.array([p / simple[k] for k, p, _ in known])
+    plant = np.interp(inside, at, relative) * simple
+    sure = np.interp(inside, at, [each for *_, each in known])
+    band = float(frequency[at[-1]])
+    off = abs(relative[-1] - 1.0) + SURE * float(sure[-1]) / gain
+    spaced = 1.0 + BEYOND * float(frequency[at[0]]) / band
+    further = min(math.sqrt((1.0 + off) / (2.0 * off)), max(spaced, LEAST_TRIED))
+    share = np.where(frequency <= band, 1.0, np.where(frequency <= further * band, TRIED, 0.0))
+    response = np.where(inside > 0, share / plant, 0.0)
+    error = np.abs(_lines(wanted - last.mean)) ** 2
+    chance = np.zeros(len(frequency))
     for here in bands:
-        seen, chance = float(np.sum(np.abs(error[here]) ** 2)), float(np.sum(variance[here]))
-        wiener[here] = max(0.0, 1.0 - chance / seen) if seen > 0.0 else 0.0
-    return Filter(frequency, whole, wiener, plant, np.where(np.isfinite(sure), sure, 0.0), band, gain, delay)
+        chance[here] = np.mean(variance[here])
+    wiener = np.maximum(0.0, 1.0 - ABOVE * chance / np.maximum(error, 1e-300))
+    explored = min(further * band, float(frequency[-1]))
+    return Filter(frequency, response, wiener, plant, sure, band, explored, gain, delay)
+
+
+def _ratio(x: NDArray[np.complex128], y: NDArray[np.complex128], chance: Array) -> tuple[complex, float] | None:
+    """P from lines of a band, and its standard deviation; `chance`: variance of y from noise. None without power."""
+    power = np.abs(x) ** 2
+    whole = float(power.sum())
+    if not whole > 0.0:
+        return None
+    p = complex(np.sum(y * np.conj(x)) / whole)
+    lines = whole**2 / float(np.sum(power**2))  # as many of equal power
+    rest = float(np.sum(np.abs(y - p * x) ** 2)) / max(lines - 1.0, 1.0) if lines > 1.5 else 0.0
+    return p, math.sqrt(max(rest, float(np.mean(chance))) / whole)
 
 
 def _lines(x: Array) -> NDArray[np.complex128]:
-    """The spectrum of a signal without its mean; a straight line joins its ends, if they differ."""
-    x = x - np.linspace(0.0, float(x[-1] - x[0]), len(x)) * (1.0 - 1.0 / len(x))
+    """The spectrum of a signal without its mean."""
     return np.fft.rfft(x - x.mean())
 
 
@@ -401,7 +459,7 @@ def learned(
         for each, error in zip(passes, errors, strict=True)
     )
     last, advice = passes[-1], list[str]()
-    found = learning_filter(float(t[1] - t[0]), last, wanted)
+    found = learning_filter(float(t[1] - t[0]), passes, wanted)
     correction = reference = None
     verdict: Literal["model_improved", "reference_corrected", "at_noise_floor", "not_convergent"]
     if found is None:
@@ -413,16 +471,18 @@ def learned(
     else:
         move = np.fft.irfft(found.wiener * found.response * np.fft.rfft(errors[-1]), len(wanted))
         left = np.fft.irfft((1.0 - found.wiener * found.response * found.plant) * np.fft.rfft(errors[-1]), len(wanted))
-        gamma, beyond = found.gamma
+        gamma = found.gamma
         expected = math.hypot(_rms(left), last.floor) if _rms(move) > 0.0 else _rms(errors[-1])
         correction = CorrectionEntry(
-            gamma=gamma, gamma_beyond=beyond, band=found.band, gain=found.gain, delay=found.delay,
+            gamma=gamma, band=found.band, explored=found.explored, gain=found.gain, delay=found.delay,
             expected=min(expected, _rms(errors[-1])), change=_rms(move),
         )
         smaller = _rms(errors[-1]) ** 2 - _rms(left) ** 2
-        if beyond > 1.0 or gamma >= 1.0:
+        if gamma >= 1.0:
             verdict = "not_convergent"
-            advice.append("No correction: |1 - L P| exceeds 1 above the band, so passes could diverge")
+            advice.append(
+                f"No correction: |1 - L P| may reach {gamma:.2f}, so passes could diverge. Record more repetitions"
+            )
         elif smaller <= SURE * last.floor**2 / math.sqrt(len(wanted) / 2.0) + STRONG * _rms(errors[-1]) ** 2:
             verdict = "at_noise_floor"
             advice.append(
@@ -438,10 +498,11 @@ def learned(
     if len(errors) > 1 and _rms(errors[-1]) > _rms(errors[-2]) + SURE * math.hypot(last.floor, passes[-2].floor):
         advice.append("The last pass is worse than the one before it by more than noise: has the stage changed?")
     if refined is not None:
-        verdict = "model_improved" if reference is None else verdict
-        advice.append("Emit the compensator again with the improved model before learning further")
+        verdict, reference = "model_improved", None
+        advice = ["Next: emit the compensator with the improved model, record again, and refine what is then left"]
     report = Report(
-        verdict=verdict, unit=unit, passes=entries, model=entry, correction=correction, stop=reference is None,
+        verdict=verdict, unit=unit, passes=entries, model=entry, correction=correction,
+        stop=reference is None and refined is None,
         advice=tuple(advice),
     )
     return Learned(report, t, refined, reference)
