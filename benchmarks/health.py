@@ -45,15 +45,16 @@ def identified(seed: int) -> tuple[Model, Stage]:
 
 
 def errors(model: Model, one: Stage, seed: int) -> tuple[Array, Array]:
-    """Expected and measured displacement of a session. It begins with a sweep, which is left out, and at whose end the
-    firmware sets the offset, since the zero of every record is its own."""
+    """Expected and measured displacement of a session. It begins with a sweep and a window, which are left out; the
+    firmware takes the mean error of that window as the sensor's zero."""
     v = multisine(seed, SAMPLES, SECONDS, 4.0, 96.0)
     sweep = np.concatenate([np.linspace(2.0, 98.0, 500), np.linspace(98.0, v[0], 500)])
     with warnings.catch_warnings(action="ignore"):
         expected = np.asarray(model.simulate(np.concatenate([sweep, v])))
     measured = one.move(np.concatenate([sweep, v]))
-    zero = slice(len(sweep) - 500, len(sweep))
-    return expected[len(sweep) :], (measured - np.mean((measured - expected)[zero]))[len(sweep) :]
+    begin = len(sweep) + WINDOW
+    zero = np.mean((measured - expected)[len(sweep) : begin])
+    return expected[begin:], (measured - zero)[begin:]
 
 
 def alarms(model: Model, sessions: Sequence[tuple[Array, Array]], probability: float) -> tuple[int, int]:

@@ -20,7 +20,8 @@ from hystgen.cli import common
     help="the wanted motion, column u, if the records were made with corrections of it",
 )
 @click.option(
-    "--correction", type=click.Path(dir_okay=False), metavar="OUT.csv", help="write the corrected reference of the next pass"
+    "--correction", type=click.Path(dir_okay=False), metavar="OUT.csv",
+    help="write the corrected reference of the next pass",
 )
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the judgement as JSON")
 @common.effects_option
@@ -50,9 +51,8 @@ def refine(
     for path in filter(None, outputs):
         common.guarded(path, partial(writing.check_writable, path))
     how, visited = common.reading_options(**reading), common.history_values(history)
-    found = common.guarded(
-        data[0], lambda: learning.refine(model, data, reference=reference, history=visited, refit=bool(output) or not correction, **how)
-    )
+    asked = {"reference": reference, "history": visited, "rest": rest, "refit": bool(output) or not correction}
+    found = common.guarded(data[0], lambda: learning.refine(model, data, **asked, **how))
     if not quiet:
         console.say(found.table())
     texts = {json_file: found.to_json()}

@@ -56,9 +56,10 @@ class Band:
 
         The residual of identification is a sample of `residual.samples` independent normal values, and a window of a
         healthy unit another one, of n = window * sample_time / residual.correlation values (at least 1). The ratio of
-        their mean squares then follows the F distribution with (n, samples) degrees of freedom, and the square of the
-        window's mean, divided by (1/n + 1/samples) times the residual's mean square, the one with (1, samples). Each of
-        the two bands is left with half of the probability.
+        their mean squares then follows the F distribution with (n, samples) degrees of freedom. The zero of a sensor
+        is not part of identification, where every record has its own: it is the mean of an earlier window. The square
+        of the difference of both means, divided by (2/n + 1/samples) times the residual's mean square, follows the F
+        distribution with (1, samples). Each of the two bands is left with half of the probability.
         """
         health, found, seconds = parameters.emit.health, parameters.residual, parameters.sample_time
         if health.band is not None:
@@ -79,7 +80,7 @@ class Band:
         window = health.window or min(max(LEAST, 1 << math.ceil(math.log2(ENOUGH * each))), MOST)
         independent = max(1.0, window / max(each, 1.0))
         half = health.false_alarms / 2.0
-        mean = math.sqrt((1.0 / independent + 1.0 / found.samples) * f_tail(1.0, found.samples, half))
+        mean = math.sqrt((2.0 / independent + 1.0 / found.samples) * f_tail(1.0, found.samples, half))
         rms = math.sqrt(f_tail(independent, found.samples, half))
         made = (float(f"{found.rms * times:.{DIGITS}g}") for times in (mean, rms))
         return cls(window, *made, health.false_alarms, independent)

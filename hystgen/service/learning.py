@@ -108,6 +108,7 @@ class CorrectionEntry(_Entry):
     gain: float = Field(description="of P")
     delay: float = Field(description="s; of P")
     expected: float = Field(description="rms error to expect of the next pass, output units")
+    above: float = Field(description="rms of the last pass's error above `band`, output units")
     change: float = Field(description="rms by which the correction moves the reference, output units")
 
 
@@ -165,10 +166,12 @@ class Pass:
 @dataclass(frozen=True, repr=False)
 class Learned:
     """What the passes teach. `refined`: the better model, None if none is; `reference`: the corrected reference (N,),
-    None where learning stops; `t`: its times in s."""
+    None where learning stops; `t`: its times in s; `error`: wanted minus mean motion
+    of the last pass (N,), about its mean."""
 
     report: Report
     t: Array = field(compare=False)
+    error: Array = field(compare=False)
     refined: refining.Refined | None = field(default=None, compare=False)
     reference: Array | None = field(default=None, compare=False)
 
@@ -191,8 +194,8 @@ class Learned:
         if (c := self.report.correction) is not None:
             lines.append(
                 f"correction: up to {c.band:.4g} Hz |1 - L P| <= {c.gamma:.2f} < 1, so the error there falls by at "
-                f"least this factor a pass until the noise; up to {c.explored:.4g} Hz half of it is tried; expected rms "
-                f"error of the next pass {c.expected:.3g}{u}"
+                f"least this factor a pass until the noise; above lies {c.above:.3g}{u} of it, and up to "
+                f"{c.explored:.4g} Hz half is tried; expected rms error of the next pass {c.expected:.3g}{u}"
             )
         return "\n".join([*lines, *self.report.advice])
 
@@ -221,6 +224,7 @@ def refine(
     sample_time: float | None = None,
     delimiter: str | None = None,
     history: Sequence[float] | None = None,
+    rest: float = 0.0,
     refit: bool = True,
     progress: bool = False,
 ) -> Learned:
@@ -231,7 +235,8 @@ def refine(
     the wanted motion, if the references given were corrected ones; by default the reference that all records share.
     At least two repetitions of the last reference are needed, since their difference is the noise. The model is
     refitted to all repetitions but the last, and taken only if it predicts that one better: then there is no corrected
-    reference, since it would be one for another compensator. `refit=False` leaves the model alone. Raises RecordError,
+    reference, since it would be one for another compensator. `refit=False` leaves the model alone. `history`, `rest`: as
+    for `diagnose`. Raises RecordError,
     ParameterError, ValueError, TypeError.
     """
     model = as_model(parameters)
@@ -248,7 +253,7 @@ def refine(
     t = np.asarray(read[0].t - read[0].t[0])
     refined, entry = None, ModelEntry(accepted=False, why="kept as it is, as asked")
     if refit:
-        refined, entry = _refitted(model, read, passes[-1].noise, history)
+        refined, entry = _refitted(model, read, passes[-1].noise, history, rest)
     return learned(t, wanted, passes, refined, entry, model.parameters.units.output)
 
 
@@ -280,7 +285,7 @@ def checked(read: Sequence[Record], own: Record | None) -> Array:
     if not span > 0.0:
         raise RecordError([f"{first.name}: error: the reference does not move; give a scan"])
     if own is not None:
-        wanted = np.asarray(own.extra[REFERENCE] if REFERENCE in own.extra else own.v, dtype=np.float64)
+        wanted = np.asarray(own.extra.get(REFERENCE, own.v), dtype=np.float64)
         if len(wanted) != len(first):
             raise RecordError([
                 f"{own.name}: error: the wanted reference has {len(wanted)} samples, the records {len(first)}; give "
@@ -319,7 +324,7 @@ def grouped(read: Sequence[Record], span: float) -> list[Pass]:
 
 
 def _refitted(
-    model: Model, read: Sequence[Record], noise: float, history: Sequence[float] | None
+    model: Model, read: Sequence[Record], noise: float, history: Sequence[float] | None, rest: float
 ) -> tuple[refining.Refined | None, ModelEntry]:
     """The model refitted to all repetitions but the last, if it predicts that one better by more than the power of the
     `noise` of a repetition."""
@@ -327,19 +332,20 @@ def _refitted(
     with parallel.one_thread():
         old = selection.as_given(model.cascade, model.effects)
         try:
-            every, _ = sessions.compared(read, old, before, 0.0, 0.0)
+            every, _ = sessions.compared(read, old, before, rest, 0.0)
             if len(every) < 2:
                 raise IdentificationError("only one repetition can be compared with the model")
             held = every[-1]
             new = refining.refine(model, every[:-1])
-            (judged,), _ = sessions.compared([held.record], selection.as_given(
-                new.model.cascade, new.model.effects), before, 0.0, 0.0)
+            fitted = selection.as_given(new.model.cascade, new.model.effects)
+            (judged,), _ = sessions.compared([held.record], fitted, before, rest, 0.0)
         except (IdentificationError, RecordError) as refused:
             return None, ModelEntry(accepted=False, why=f"kept as it is: {refused}")
     u = f" {model.parameters.units.output}".rstrip()
     better = held.rms**2 - judged.rms**2 > SURE * noise**2
     said = f"held-out rms error {held.rms:.3g}{u} as given, {judged.rms:.3g}{u} refitted"
-    why = f"improved: {said}" if better else f"kept as it is: a refit does not predict a held-out repetition better ({said})"
+    worse = f"kept as it is: a refit does not predict a held-out repetition better ({said})"
+    why = f"improved: {said}" if better else worse
     return new if better else None, ModelEntry(accepted=better, before=held.rms, after=judged.rms, why=why)
 
 
@@ -397,13 +403,14 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     for here in bands:
         found = [
             each for x, z, chance in moved
-            if np.max(np.abs(x[here])) > CHANGED * np.max(np.abs(x)) and (each := _ratio(x[here], z[here], chance[here]))
+            if np.max(np.abs(x[here])) > CHANGED * np.max(np.abs(x))
+            and (each := _ratio(x[here], z[here], chance[here]))
         ]
         found = [each for each in found if SURE * each[1] < 0.5 * GAMMA * abs(each[0])]
         centre = here[np.argmax(weight[here])] if weight[here].any() else here[len(here) // 2]
-        if not found and weight[here].any() and (own := _ratio(u[here], y[here], variance[here])):
-            if abs(own[0] / simple[centre] - 1.0) + SURE * own[1] / gain < 0.5 * GAMMA:
-                found = [own]
+        own = _ratio(u[here], y[here], variance[here]) if weight[here].any() and not found else None
+        if own and abs(own[0] / simple[centre] - 1.0) + SURE * own[1] / gain < 0.5 * GAMMA:
+            found = [own]
         if found and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
             best = min(found, key=lambda each: each[1] / abs(each[0]))
             if abs(best[0] / simple[centre] - 1.0) + SURE * best[1] / gain > GAMMA:
@@ -476,6 +483,7 @@ def learned(
         correction = CorrectionEntry(
             gamma=gamma, band=found.band, explored=found.explored, gain=found.gain, delay=found.delay,
             expected=min(expected, _rms(errors[-1])), change=_rms(move),
+            above=_rms(np.fft.irfft(np.fft.rfft(errors[-1]) * (found.frequency > found.band), len(wanted))),
         )
         smaller = _rms(errors[-1]) ** 2 - _rms(left) ** 2
         if gamma >= 1.0:
@@ -505,7 +513,7 @@ def learned(
         stop=reference is None and refined is None,
         advice=tuple(advice),
     )
-    return Learned(report, t, refined, reference)
+    return Learned(report, t, errors[-1], refined, reference)
 
 
 def _centred(x: Array) -> Array:
