@@ -1,4 +1,4 @@
-"""Iterative learning on blind stages: does the error fall in each of five passes, and never rise by more than its noise?
+"""Iterative learning on blind stages: the error should fall in each of five passes, and never rise by more than noise.
 
     python -m benchmarks.learning [--stages 12] [--repetitions 3]
 

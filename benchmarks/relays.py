@@ -85,7 +85,8 @@ def multisine(seed: int, samples: int, seconds: float, low: float = 2.0, high: f
     random = np.random.default_rng((seed, 2))
     t = np.arange(samples) * seconds
     lines = np.array([0.5, 1.3, 2.9, 5.1, 11.7]) * random.uniform(0.8, 1.2, 5)
-    x = sum(np.sin(2 * np.pi * f * t + phase) / f**0.7 for f, phase in zip(lines, random.uniform(0, 6.28, 5), strict=True))
+    phases = random.uniform(0.0, 2.0 * np.pi, 5)
+    x = sum(np.sin(2.0 * np.pi * f * t + phase) / f**0.7 for f, phase in zip(lines, phases, strict=True))
     x = low + (high - low) * (x - x.min()) / np.ptp(x)
     begin = np.minimum(t / 0.2, 1.0)
     return np.asarray(low + begin * (x - low))

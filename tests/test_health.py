@@ -112,7 +112,7 @@ def test_the_c_has_the_bits_of_the_reference(name: str, layout: str, text: str) 
     )
     assert report.ok, report.table()
     rows = [row for row in report.rows if row.operator == "health"]
-    assert len(rows) == 2 and all(row.samples == 900 for row in rows)
+    assert [row.samples for row in rows] == [900, 900]
 
 
 @pytest.mark.parametrize("name", ["float32", pytest.param("q31", marks=pytest.mark.slow), "q15"])
@@ -138,7 +138,8 @@ def test_an_instance_takes_forty_bytes_at_most(name: str) -> None:
 def test_without_the_option_nothing_changes() -> None:
     plain, watched = emitted(False), emitted(True)
     assert not any("health" in text.lower() for text in plain.values())
-    assert "--health" in watched["m.h"] and "M_STATUS_MODEL_LEFT 64u" in watched["m.h"]
+    assert "--health" in watched["m.h"]
+    assert "M_STATUS_MODEL_LEFT 64u" in watched["m.h"]
     assert canonical_json(model("").parameters) == canonical_json(model("emit: {operator: inverse}\n").parameters)
 
 
@@ -183,7 +184,7 @@ def test_wrong_keys_are_refused(keys: str, words: str) -> None:
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_false_alarms_of_coloured_noise_are_those_stated(colour: float) -> None:
-    """A residual of AR(1) noise, and 3000 windows of more of it, each with the zero from a window of its own: the band is
+    """A residual of AR(1) noise, and 3000 windows of more of it, each with a zero from a window of its own: the band is
     an estimate from 400 000 samples, which moves the rate by a few per cent; 4 standard deviations of the count, and a
     quarter for windows of which only some tens of samples are independent, so that their sums are not quite normal."""
     p, rng = 0.05, np.random.default_rng(7)

@@ -167,8 +167,9 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
     single-header; `allow_partial` leaves out effects that the C cannot include; `manifest` writes NAME_manifest.json as
     well; `integration`: tools for which to write a folder NAME/, among cmake, meson, conan, platformio, arduino, zephyr
-    and espidf; `health` adds a watch over the model's error. Missing options come from the file. Existing files with the same bytes are left alone. Raises
-    ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError, before anything is written;
+    and espidf; `health` adds a watch over the model's error. Missing options come from the file. Existing files with
+    the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError,
+    before anything is written;
     FileExistsError if a package would replace a file of another origin.
     """
     return write(Path(arguments.path("output", output)), emitted_files(source, **options))

@@ -57,7 +57,8 @@ def command(parameters: Parameters, options: Options) -> str:
         from hystgen.effects.base import USER
 
         origins = {own_effects.origin(type(each)): None for each in effects if each.name.startswith(USER)}
-    more = " --health" * options.health + " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    more = " --health" * options.health + " --allow-partial" * bool(options.left_out)
+    more += "".join(f" --effects {shlex.quote(each)}" for each in origins)
     chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
@@ -365,12 +366,12 @@ def watched(one: EmittedModel) -> list[str]:
     """Sentences on the bands of the watch over the model's error, and on false alarms."""
     if one.watch is None:
         return []
-    band, seconds, unit = one.watch.band, one.model.parameters.sample_time, one.form.unit(one.units.output)
+    band, seconds = one.watch.band, one.model.parameters.sample_time
     unit = f" {one.units.output}" if one.units.output else ""
     lasts = "" if seconds is None else f" ({duration(band.window * seconds)})"
     said = (
-        f"Health: over {band.window} samples{lasts} the mean error stays within {band.mean:.4g}{unit} and the rms error "
-        f"within {band.rms:.4g}{unit}; "
+        f"Health: over {band.window} samples{lasts} the mean error stays within {band.mean:.4g}{unit} and the rms "
+        f"error within {band.rms:.4g}{unit}; "
     )
     found = one.model.parameters.residual
     if band.false_alarms is None or found is None or seconds is None:
@@ -379,7 +380,7 @@ def watched(one: EmittedModel) -> list[str]:
         f"a window of a healthy unit leaves these bands with probability {band.false_alarms:.3g}, about once in "
         f"{duration(band.window * seconds / band.false_alarms)}. They follow from a residual of {found.rms:.4g}{unit} "
         f"in {found.samples:.3g} independent samples; a window has {band.independent:.3g}"
-    )]
+    ) + ". The mean holds for a zero of the sensor that is the mean of an earlier window"]
 
 
 def _timing(one: EmittedModel) -> list[Macro]:

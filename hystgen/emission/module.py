@@ -267,7 +267,8 @@ def files(module: Module) -> dict[str, str]:
         found |= runtime_files(options.arithmetic)
     operators = selftest.operators(one)
     codes, windows = selftest.codes(one), selftest.windows(one)
-    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators), len(codes), len(windows))
+    samples = sum(len(each.samples) for each in operators)
+    costs = interface.selftest_cost(options, module.cost, samples, len(codes), len(windows))
     for ending, about, more in (
         (".h", f"checks {name} on the target", costs),
         (".c", "recorded samples and their exact answers", []),

@@ -110,9 +110,10 @@ def windows(one: EmittedModel) -> list[Window]:
         return []
     low, high = (float(end) for end in one.numbers.tables.limits.output[0])
     middle = reference.nearest(one.numbers.tables, np.array([(low + high) / 2.0]))[0]
+    band = watch.band.rms / float(one.numbers.lsb[1] if one.numbers.lsb else 1)
     found = []
     for errors in SHARES:
-        measured = float(middle) + np.array(errors) * watch.band.rms / float(one.numbers.lsb[1] if one.numbers.lsb else 1)
+        measured = float(middle) + np.array(errors) * band
         if kind.kind == "i":
             measured = np.clip(np.rint(measured), np.iinfo(kind).min, np.iinfo(kind).max)
         even, odd = (kind.type(each) for each in measured)

@@ -235,9 +235,8 @@ def refine(
     the wanted motion, if the references given were corrected ones; by default the reference that all records share.
     At least two repetitions of the last reference are needed, since their difference is the noise. The model is
     refitted to all repetitions but the last, and taken only if it predicts that one better: then there is no corrected
-    reference, since it would be one for another compensator. `refit=False` leaves the model alone. `history`, `rest`: as
-    for `diagnose`. Raises RecordError,
-    ParameterError, ValueError, TypeError.
+    reference, since it would be one for another compensator. `refit=False` leaves the model alone. `history`, `rest`:
+    as for `diagnose`. Raises RecordError, ParameterError, ValueError, TypeError.
     """
     model = as_model(parameters)
     given = several(records)
@@ -494,14 +493,14 @@ def learned(
         elif smaller <= SURE * last.floor**2 / math.sqrt(len(wanted) / 2.0) + STRONG * _rms(errors[-1]) ** 2:
             verdict = "at_noise_floor"
             advice.append(
-                f"Stop: what is left, {_rms(errors[-1]):.3g}{u} rms, is noise in the band up to {found.band:.4g} Hz that "
-                "can be learned; keep this reference. More repetitions a pass would lower the noise"
+                f"Stop: in the band up to {found.band:.4g} Hz, which can be learned, only noise is left of "
+                f"{_rms(errors[-1]):.3g}{u} rms; keep this reference. More repetitions a pass would lower the noise"
             )
         else:
             verdict, reference = "reference_corrected", last.given + move
             advice.append(
-                f"Next: give the compensator the corrected reference, record {counted(len(last.measured), 'repetition')}"
-                ", and refine again with all records and --reference"
+                "Next: give the compensator the corrected reference, record "
+                f"{counted(len(last.measured), 'repetition')}, and refine again with all records and --reference"
             )
     if len(errors) > 1 and _rms(errors[-1]) > _rms(errors[-2]) + SURE * math.hypot(last.floor, passes[-2].floor):
         advice.append("The last pass is worse than the one before it by more than noise: has the stage changed?")

@@ -26,8 +26,9 @@ def rows(
     progress: Callable[[str], None],
     health: ExpectedHealth | None = None,
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build, and one for the watch over the model's error. For a core with an FPU, there is also a build without flags, in which
-    compilers may contract a product and a sum, with a row for the self-test; if qemu is installed, the self-test also
+    """One row per operator, compiler and build, and one for the watch over the model's error. For a core with an FPU,
+    there is also a build without flags, in which compilers may contract a product and a sum, with a row for the
+    self-test; if qemu is installed, the self-test also
     runs as a whole firmware.
     """
     try:
@@ -101,10 +102,8 @@ def _emulated(
         try:
             core = emulator.Core(target, image)
             outcome = compare_health(functools.partial(core.health, sources.name), health)
-            counts = core.counts
-            yield replace(
-                row, **vars(outcome), mean_instructions=round(float(counts.mean()), 2), max_instructions=int(counts.max())
-            )
+            mean, most = round(float(core.counts.mean()), 2), int(core.counts.max())
+            yield replace(row, **vars(outcome), mean_instructions=mean, max_instructions=most)
         except (compilers.MissingError, emulator.EmulatorError) as error:
             yield failed(row, error)
     row = Row(target.name, compiler.name, build, "selftest")

@@ -217,7 +217,8 @@ class Core:
         return answer, status
 
     def health(
-        self, name: str, expected: NDArray[np.number], measured: NDArray[np.number], kinds: Sequence[np.dtype[np.number]]
+        self, name: str, expected: NDArray[np.number], measured: NDArray[np.number],
+        kinds: Sequence[np.dtype[np.number]],
     ) -> list[NDArray[np.number]]:
         """Let the harness watch the model's error, counting the instructions of NAME_health_update; `kinds`: types of
         the results."""

@@ -131,8 +131,8 @@ def codes(conversion: CodeConversion, length: int) -> NDArray[np.int64]:
 def displacements(
     real: np.dtype[Any], band: Band, lsb: float, length: int
 ) -> tuple[NDArray[np.number], NDArray[np.number]]:
-    """Expected and measured displacements (length,), the same every time: blocks with errors from a tenth of the band to
-    three times, with and without a mean; in the last tenth, extremes and numbers that are none."""
+    """Expected and measured displacements (length,), the same every time: blocks with errors from a tenth of the band
+    to three times, with and without a mean; in the last tenth, extremes and numbers that are none."""
     rng = np.random.default_rng(20261205)
     count = max(length // max(band.window, 1), 12)
     block = -(-length // count)

@@ -93,7 +93,8 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(name, options.operators, calls, ARITHMETICS[options.arithmetic], coded, watched)
+    arithmetic = ARITHMETICS[options.arithmetic]
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, watched)
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded, watched)
