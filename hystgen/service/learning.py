@@ -389,6 +389,10 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
         (_lines(b.given - a.given), _lines(b.mean - a.mean), a.variance + b.variance)
         for a, b in itertools.pairwise(passes)
     ]
+    tried = [
+        (np.abs(_lines(wanted - a.mean)) ** 2, np.abs(_lines(wanted - b.mean)) ** 2, np.abs(change) ** 2)
+        for (a, b), (change, *_) in zip(itertools.pairwise(passes), moved, strict=True)
+    ]
     edges = frequency[1] * 2.0 ** (np.arange(0, BANDS * math.log2(len(frequency)) + 1) / BANDS)
     places = np.digitize(frequency, edges)
     bands = [np.flatnonzero(places == k) for k in np.unique(places[1:])]
@@ -410,10 +414,13 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
         own = _ratio(u[here], y[here], variance[here]) if weight[here].any() and not found else None
         if own and abs(own[0] / simple[centre] - 1.0) + SURE * own[1] / gain < 0.5 * GAMMA:
             found = [own]
-        if found and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
-            best = min(found, key=lambda each: each[1] / abs(each[0]))
-            if abs(best[0] / simple[centre] - 1.0) + SURE * best[1] / gain > GAMMA:
-                break  # a mode: what hysteresis makes of lower lines is amplified there, and P is not what it seems
+        best = min(found, key=lambda each: each[1] / abs(each[0]), default=None)
+        far = best is not None and abs(best[0] / simple[centre] - 1.0) > GAMMA
+        if known and (best is None or far) and any(_fell(*each, here) for each in tried):
+            best, far = (known[-1][1] / simple[known[-1][0]] * simple[centre], 0.5 * GAMMA / SURE * gain), False
+        if far:
+            break  # a mode: what hysteresis makes of lower lines is amplified there, and P is not what it seems
+        if best is not None and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
             known.append((int(centre), *best))
     if not known:
         return None
@@ -435,6 +442,13 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     wiener = np.maximum(0.0, 1.0 - ABOVE * chance / np.maximum(error, 1e-300))
     explored = min(further * band, float(frequency[-1]))
     return Filter(frequency, response, wiener, plant, sure, band, explored, gain, delay)
+
+
+def _fell(before: Array, after: Array, change: Array, here: NDArray[np.intp]) -> bool:
+    """Whether a change of the reference by more than rounding made the power of the error in a band smaller: P is then
+    near enough to its value below, even if the change was too small to measure it."""
+    learned = here[change[here] > STRONG * before[here]]
+    return bool(len(learned)) and float(after[learned].sum()) < float(before[learned].sum())
 
 
 def _ratio(x: NDArray[np.complex128], y: NDArray[np.complex128], chance: Array) -> tuple[complex, float] | None:
