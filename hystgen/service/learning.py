@@ -67,6 +67,9 @@ CHANGED = 0.03
 """[fraction of the largest line] A smaller change of the reference does not show P: the motion also differs between two
 passes because creep goes on."""
 
+SMOOTHED = 15
+"""[lines] The noise of a line is the mean over this many, known to 1/sqrt(15) = 26 % with two repetitions."""
+
 ABOVE = 3.0
 """[times the noise's power] Lines of the error below this are not learned: 5 % of those of noise alone are above."""
 
@@ -146,10 +149,13 @@ class Pass:
 
     @property
     def variance(self) -> Array:
-        """Variance of the lines of the mean's spectrum."""
+        """Variance of the lines of the mean's spectrum, each from `SMOOTHED` lines around it."""
         r = len(self.measured)
-        lines = np.abs([_lines(each - self.mean) for each in self.measured]) ** 2
-        return np.asarray(lines.sum(axis=0) / (r - 1) / r)
+        lines = np.sum(np.abs([_lines(each - self.mean) for each in self.measured]) ** 2, axis=0) / (r - 1) / r
+        around = np.ones(min(SMOOTHED, len(lines)))
+        known = np.ones(len(lines))
+        known[0] = 0.0  # the mean is taken out
+        return np.asarray(np.convolve(lines, around, "same") / np.convolve(known, around, "same"))
 
     @property
     def noise(self) -> float:
