@@ -55,17 +55,13 @@ STEP = 1e-3
 TRIED = 0.5
 """[fraction] Above the frequency up to which P is known, L goes on with half of the gain. The error does not rise there
 while P is within a factor of 2 and 60 degrees of its value below, |1 - 0.5 * 2 exp(j 60 deg)| = 1, and the next pass
-shows P there."""
+shows whether it did."""
 
 LEAST_TRIED, MOST_TRIED, BEYOND = 2.0 ** (1 / 3), 3.2, 2.1
 """[times the last known frequency, the same, times the lowest] L is tried up to the next odd harmonic of a triangle, or
 the next band, unless a mode may double P before: one that explains how far P is from gain and delay at the last known
 frequency, by d, does so at sqrt((1 + d) / (2 d)) times this frequency. Bands further apart than three times, the first
 two harmonics of a triangle, are not interpolated."""
-
-CHANGED = 0.03
-"""[fraction of the largest line] A smaller change of the reference does not show P: the motion also differs between two
-passes because creep goes on."""
 
 SMOOTHED = 15
 """[lines] The noise of a line is the mean over this many, known to 1/sqrt(15) = 26 % with two repetitions."""
@@ -358,6 +354,7 @@ def _refitted(
 class Filter:
     """L on the frequencies (K,) of a record: `response`, complex, times `wiener` from 0 to 1, which keeps noise out;
     and P, interpolated between the bands in which it is known: `plant`, with standard deviation `sure`, both (K,).
+    `given`, `error`: lines of the reference and its error from which to go on, those of the best pass in each band;
     `band`: Hz up to which P is known, `explored`: Hz up to which L tries less."""
 
     frequency: Array
@@ -365,6 +362,8 @@ class Filter:
     wiener: Array
     plant: NDArray[np.complex128]
     sure: Array
+    given: NDArray[np.complex128]
+    error: NDArray[np.complex128]
     band: float
     explored: float
     gain: float
@@ -380,25 +379,16 @@ class Filter:
 
 
 def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filter | None:
-    """The filter for the last pass; None if P is not known at any frequency.
+    """The filter for the next pass; None if P is not known at any frequency.
 
-    P is estimated in bands of a third of an octave by least squares over the lines in each, P = sum Y conj(X) /
-    sum |X|^2, with the part of Y that X does not explain and the noise between repetitions as uncertainty. X and Y are
-    the difference between two passes where that is sure enough, since whatever the compensator leaves of the hysteresis
-    cancels in it; otherwise reference and motion of the last pass, where they agree with the gain and delay of the
-    whole, P0, well enough for the rest to be hysteresis or noise. In known bands L = 1/P, and somewhat above
-    them TRIED/P, so that the next pass shows P there.
+    P is estimated in bands of a third of an octave by least squares over the lines in each, P = sum Y conj(U) /
+    sum |U|^2, with the part of Y that U does not explain and the noise between repetitions as uncertainty. A band is
+    known where this agrees with the gain and delay of the whole, P0, well enough, or where an earlier pass has changed
+    the reference and the error fell. There L = 1/P, with P0 for P in the latter case; above, up to the next harmonic,
+    L = TRIED/P0, and the next pass shows whether the error falls. L ends below a band in which it has risen.
     """
     last, frequency = passes[-1], np.fft.rfftfreq(len(wanted), step)
     u, y, variance = _lines(last.given), _lines(last.mean), last.variance
-    moved = [
-        (_lines(b.given - a.given), _lines(b.mean - a.mean), a.variance + b.variance)
-        for a, b in itertools.pairwise(passes)
-    ]
-    tried = [
-        (np.abs(_lines(wanted - a.mean)) ** 2, np.abs(_lines(wanted - b.mean)) ** 2, np.abs(change) ** 2)
-        for (a, b), (change, *_) in zip(itertools.pairwise(passes), moved, strict=True)
-    ]
     edges = frequency[1] * 2.0 ** (np.arange(0, BANDS * math.log2(len(frequency)) + 1) / BANDS)
     places = np.digitize(frequency, edges)
     bands = [np.flatnonzero(places == k) for k in np.unique(places[1:])]
@@ -408,26 +398,30 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     delay = -float(np.sum(weight * frequency * phase) / np.sum(weight * frequency**2)) / (2.0 * np.pi)
     gain = float(np.sum(np.abs(y) * np.sqrt(weight)) / np.sum(weight))
     simple = gain * np.exp(-2j * np.pi * frequency * delay)
+    powers = [np.abs(_lines(wanted - each.mean)) ** 2 for each in passes]
+    changes = [np.abs(_lines(after.given - before.given)) ** 2 for before, after in itertools.pairwise(passes)]
+    given, error = np.array(u), np.array(_lines(wanted - last.mean))
     known: list[tuple[int, complex, float]] = []
+    risen = False
     for here in bands:
-        found = [
-            each for x, z, chance in moved
-            if np.max(np.abs(x[here])) > CHANGED * np.max(np.abs(x))
-            and (each := _ratio(x[here], z[here], chance[here]))
-        ]
-        found = [each for each in found if SURE * each[1] < 0.5 * GAMMA * abs(each[0])]
+        sums, chance = [float(each[here].sum()) for each in powers], float(variance[here].sum())
+        best = min(range(len(passes)), key=sums.__getitem__)
+        if sums[-1] > sums[best] + SURE * chance:  # this band was better before
+            given[here] = _lines(passes[best].given)[here]
+            error[here] = _lines(wanted - passes[best].mean)[here]
+        learned = [k for k, each in enumerate(changes) if each[here].sum() > STRONG * sums[k]]
         centre = here[np.argmax(weight[here])] if weight[here].any() else here[len(here) // 2]
-        own = _ratio(u[here], y[here], variance[here]) if weight[here].any() and not found else None
-        if own and abs(own[0] / simple[centre] - 1.0) + SURE * own[1] / gain < 0.5 * GAMMA:
-            found = [own]
-        best = min(found, key=lambda each: each[1] / abs(each[0]), default=None)
-        far = best is not None and abs(best[0] / simple[centre] - 1.0) > GAMMA
-        if known and (best is None or far) and any(_fell(*each, here) for each in tried):
-            best, far = (known[-1][1] / simple[known[-1][0]] * simple[centre], 0.5 * GAMMA / SURE * gain), False
-        if far:
-            break  # a mode: what hysteresis makes of lower lines is amplified there, and P is not what it seems
-        if best is not None and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
-            known.append((int(centre), *best))
+        found = _ratio(u[here], y[here], variance[here]) if weight[here].any() else None
+        if found and abs(found[0] / simple[centre] - 1.0) + SURE * found[1] / gain >= 0.5 * GAMMA:
+            found = None
+        if learned and sums[learned[-1] + 1] > sums[learned[-1]] + SURE * chance:
+            risen = True  # a mode, or what hysteresis makes of lower lines
+        elif found is None and learned and known:
+            found = complex(simple[centre]), 0.5 * GAMMA / SURE * gain
+        if risen:
+            break
+        if found and (not known or frequency[centre] <= MOST_TRIED * frequency[known[-1][0]]):
+            known.append((int(centre), *found))
     if not known:
         return None
     at, inside = [k for k, *_ in known], np.arange(len(frequency))
@@ -437,24 +431,13 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     sure = np.interp(inside, at, [each for *_, each in known])
     band = float(frequency[at[-1]])
     off = abs(relative[-1] - 1.0) + SURE * float(sure[-1]) / gain
-    spaced = 1.0 + BEYOND * float(frequency[at[0]]) / band
-    further = min(math.sqrt((1.0 + off) / (2.0 * off)), max(spaced, LEAST_TRIED))
+    spaced = max(1.0 + BEYOND * float(frequency[at[0]]) / band, LEAST_TRIED)
+    further = 1.0 if risen else min(math.sqrt((1.0 + off) / (2.0 * off)), spaced)
     share = np.where(frequency <= band, 1.0, np.where(frequency <= further * band, TRIED, 0.0))
     response = np.where(inside > 0, share / plant, 0.0)
-    error = np.abs(_lines(wanted - last.mean)) ** 2
-    chance = np.zeros(len(frequency))
-    for here in bands:
-        chance[here] = np.mean(variance[here])
-    wiener = np.maximum(0.0, 1.0 - ABOVE * chance / np.maximum(error, 1e-300))
+    wiener = np.maximum(0.0, 1.0 - ABOVE * variance / np.maximum(np.abs(error) ** 2, 1e-300))
     explored = min(further * band, float(frequency[-1]))
-    return Filter(frequency, response, wiener, plant, sure, band, explored, gain, delay)
-
-
-def _fell(before: Array, after: Array, change: Array, here: NDArray[np.intp]) -> bool:
-    """Whether a change of the reference by more than rounding made the power of the error in a band smaller: P is then
-    near enough to its value below, even if the change was too small to measure it."""
-    learned = here[change[here] > STRONG * before[here]]
-    return bool(len(learned)) and float(after[learned].sum()) < float(before[learned].sum())
+    return Filter(frequency, response, wiener, plant, sure, given, error, band, explored, gain, delay)
 
 
 def _ratio(x: NDArray[np.complex128], y: NDArray[np.complex128], chance: Array) -> tuple[complex, float] | None:
@@ -495,8 +478,10 @@ def learned(
             "Record more repetitions, or a pass with a larger or faster reference"
         )
     else:
-        move = np.fft.irfft(found.wiener * found.response * np.fft.rfft(errors[-1]), len(wanted))
-        left = np.fft.irfft((1.0 - found.wiener * found.response * found.plant) * np.fft.rfft(errors[-1]), len(wanted))
+        steps = found.wiener * found.response
+        to = np.fft.irfft(found.given + steps * found.error, len(wanted)) + float(last.given.mean())
+        move = to - last.given
+        left = np.fft.irfft((1.0 - steps * found.plant) * found.error, len(wanted))
         gamma = found.gamma
         expected = math.hypot(_rms(left), last.floor) if _rms(move) > 0.0 else _rms(errors[-1])
         correction = CorrectionEntry(
@@ -517,7 +502,7 @@ def learned(
                 f"{_rms(errors[-1]):.3g}{u} rms; keep this reference. More repetitions a pass would lower the noise"
             )
         else:
-            verdict, reference = "reference_corrected", last.given + move
+            verdict, reference = "reference_corrected", to
             advice.append(
                 "Next: give the compensator the corrected reference, record "
                 f"{counted(len(last.measured), 'repetition')}, and refine again with all records and --reference"
