@@ -401,12 +401,13 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     powers = [np.abs(_lines(wanted - each.mean)) ** 2 for each in passes]
     changes = [np.abs(_lines(after.given - before.given)) ** 2 for before, after in itertools.pairwise(passes)]
     given, error = np.array(u), np.array(_lines(wanted - last.mean))
+    chance = SURE * float(variance.sum())  # of the whole error: less is not worth a judgement
     known: list[tuple[int, complex, float]] = []
     risen = False
     for here in bands:
-        sums, chance = [float(each[here].sum()) for each in powers], float(variance[here].sum())
+        sums = [float(each[here].sum()) for each in powers]
         best = min(range(len(passes)), key=sums.__getitem__)
-        if sums[-1] > sums[best] + SURE * chance:  # this band was better before
+        if sums[-1] > sums[best] + chance:  # this band was better before
             given[here] = _lines(passes[best].given)[here]
             error[here] = _lines(wanted - passes[best].mean)[here]
         learned = [k for k, each in enumerate(changes) if each[here].sum() > STRONG * sums[k]]
@@ -414,7 +415,7 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
         found = _ratio(u[here], y[here], variance[here]) if weight[here].any() else None
         if found and abs(found[0] / simple[centre] - 1.0) + SURE * found[1] / gain >= 0.5 * GAMMA:
             found = None
-        if learned and sums[learned[-1] + 1] > sums[learned[-1]] + SURE * chance:
+        if learned and sums[learned[-1] + 1] > sums[learned[-1]] + chance:
             risen = True  # a mode, or what hysteresis makes of lower lines
         elif found is None and learned and known:
             found = complex(simple[centre]), 0.5 * GAMMA / SURE * gain
