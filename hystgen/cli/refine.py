@@ -51,11 +51,16 @@ def refine(
     for path in filter(None, outputs):
         common.guarded(path, partial(writing.check_writable, path))
     how, visited = common.reading_options(**reading), common.history_values(history)
-    asked = {"reference": reference, "history": visited, "rest": rest, "refit": bool(output) or not correction}
-    found = common.guarded(data[0], lambda: learning.refine(model, data, **asked, **how))
+    refit = bool(output) or not correction
+    found = common.guarded(
+        data[0],
+        lambda: learning.refine(
+            model, data, reference=reference, history=visited, rest=rest, refit=refit, **how
+        ),
+    )
     if not quiet:
         console.say(found.table())
-    texts = {json_file: found.to_json()}
+    texts: dict[str | None, str] = {json_file: found.to_json()}
     if output and found.refined is not None:
         texts[output] = found.refined.text()
     elif output:
@@ -65,8 +70,8 @@ def refine(
     elif correction:
         why = "the improved model comes first" if found.refined else "a further pass would be of no use"
         console.note(f"{correction}: not written, {why}")
-    for path, text in texts.items():
-        if path:
-            common.guarded(path, partial(writing.write_atomically, path, text))
+    for file, text in texts.items():
+        if file:
+            common.guarded(file, partial(writing.write_atomically, file, text))
             if not quiet:
-                console.say(path)
+                console.say(file)

@@ -82,8 +82,8 @@ class Band:
         half = health.false_alarms / 2.0
         mean = math.sqrt((2.0 / independent + 1.0 / found.samples) * f_tail(1.0, found.samples, half))
         rms = math.sqrt(f_tail(independent, found.samples, half))
-        made = (float(f"{found.rms * times:.{DIGITS}g}") for times in (mean, rms))
-        return cls(window, *made, health.false_alarms, independent)
+        mean, rms = (float(f"{found.rms * times:.{DIGITS}g}") for times in (mean, rms))
+        return cls(window, mean, rms, health.false_alarms, independent)
 
 
 def f_tail(n: float, m: float, p: float) -> float:
@@ -100,7 +100,7 @@ def f_tail(n: float, m: float, p: float) -> float:
         else:
             high = middle
     z = 10.0**low
-    return m * (1.0 - z) / (n * z)
+    return float(m * (1.0 - z) / (n * z))
 
 
 class Watch(ABC):

@@ -415,7 +415,7 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
         found = _ratio(u[here], y[here], variance[here]) if weight[here].any() else None
         if found and abs(found[0] / simple[centre] - 1.0) + SURE * found[1] / gain >= 0.5 * GAMMA:
             found = None
-        if learned and sums[learned[-1] + 1] > sums[learned[-1]] + chance:
+        if found is None and learned and sums[learned[-1] + 1] > sums[learned[-1]] + chance:
             risen = True  # a mode, or what hysteresis makes of lower lines
         elif found is None and learned and known:
             found = complex(simple[centre]), 0.5 * GAMMA / SURE * gain
@@ -438,7 +438,9 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     response = np.where(inside > 0, share / plant, 0.0)
     wiener = np.maximum(0.0, 1.0 - ABOVE * variance / np.maximum(np.abs(error) ** 2, 1e-300))
     explored = min(further * band, float(frequency[-1]))
-    return Filter(frequency, response, wiener, plant, sure, given, error, band, explored, gain, delay)
+    return Filter(
+        np.asarray(frequency, dtype=np.float64), response, wiener, plant, sure, given, error, band, explored, gain, delay
+    )
 
 
 def _ratio(x: NDArray[np.complex128], y: NDArray[np.complex128], chance: Array) -> tuple[complex, float] | None:
