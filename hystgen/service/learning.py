@@ -438,9 +438,8 @@ def learning_filter(step: float, passes: Sequence[Pass], wanted: Array) -> Filte
     response = np.where(inside > 0, share / plant, 0.0)
     wiener = np.maximum(0.0, 1.0 - ABOVE * variance / np.maximum(np.abs(error) ** 2, 1e-300))
     explored = min(further * band, float(frequency[-1]))
-    return Filter(
-        np.asarray(frequency, dtype=np.float64), response, wiener, plant, sure, given, error, band, explored, gain, delay
-    )
+    lines = np.asarray(frequency, dtype=np.float64)
+    return Filter(lines, response, wiener, plant, sure, given, error, band, explored, gain, delay)
 
 
 def _ratio(x: NDArray[np.complex128], y: NDArray[np.complex128], chance: Array) -> tuple[complex, float] | None:
