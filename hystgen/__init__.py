@@ -48,8 +48,10 @@ if TYPE_CHECKING:
     from hystgen.report.fleet import report_fleet as report_fleet
     from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
+    from hystgen.report.monitoring import monitor as monitor
     from hystgen.report.plan import plan as plan
     from hystgen.report.tracking import track as track
+    from hystgen.service.learning import refine as refine
     from hystgen.verification.run import verify as verify
 
 # The module of each public name, imported on first use because `hystgen emit` has to start fast. A test checks that it
@@ -70,8 +72,10 @@ _NAMES = {
     "report.diagnosis": ("diagnose",),
     "report.fleet": ("report_fleet",),
     "report.identification": ("identify", "report_fit"),
+    "report.monitoring": ("monitor",),
     "report.plan": ("plan",),
     "report.tracking": ("track",),
+    "service.learning": ("refine",),
     "verification.run": ("verify",),
 }
 _PLACES = {name: module for module, names in _NAMES.items() for name in names}

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.converter import CodeConversion
+    from hystgen.compensator.health import Watch
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
     from hystgen.records.frames import Given
@@ -302,6 +303,16 @@ class Model:
             self._check_slew(float(abs(converter.CodeLine.of(both.drive).step)), seconds)
         lsb = self._exact_lsb(arithmetic, engine) if arithmetic in FIXED else None
         return converter.of(both, ARITHMETICS[arithmetic], lsb)
+
+    def watch(self, arithmetic: str, engine: str = "loop", changed: bool = False) -> Watch:
+        """The watch over the model's error in an arithmetic; `changed`: the C leaves out effects. Raises FormatError.
+        """
+        from hystgen.compensator import health
+
+        band = health.Band.of(self.parameters, changed)
+        if arithmetic not in FIXED:
+            return health.FloatWatch(band, ARITHMETICS[arithmetic])
+        return health.FixedWatch(band, float(self._exact_lsb(arithmetic, engine)[1]), FIXED[arithmetic].code_bits)
 
     def _check_slew(self, step: float, seconds: float) -> None:
         """Raise FormatError if a slew limit is less than one `step` of the drive's converter per sample: each sample

@@ -44,6 +44,7 @@ ROOMS = (
     "diagnosis",
     "comparison",
     "planning",
+    "service",
     "report",
     "cli",
     "__main__",
@@ -197,7 +198,7 @@ def test_dir_and_help_list_the_public_names() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["emit", "verify", "build", "fmu", "identify", "diagnose", "compare", "plan", "differences"]
+    "name", ["emit", "verify", "build", "fmu", "identify", "diagnose", "compare", "monitor", "plan", "differences"]
 )
 def test_signatures_are_real(name: str) -> None:
     """Every option is in the signature with its default, and none is hidden in `**options`."""

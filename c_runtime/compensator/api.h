@@ -1,5 +1,6 @@
 /* Calls for users of every model. */
 #include "compensator/model.h"
+#include "compensator/health.h"
 #ifndef HYSTGEN_API_H
 #define HYSTGEN_API_H
 
@@ -26,5 +27,12 @@ hystgen_real_t hystgen_drive_from_code(int32_t code);
 int32_t hystgen_code_from_drive(hystgen_real_t drive);
 /* HYSTGEN_STATUS_* bits since the last call; reading clears them. */
 unsigned int hystgen_operator_status(hystgen_operator_t *self);
+/* Begins to watch the error of the model. */
+void hystgen_health_init(hystgen_health_t *self);
+/* One sample: the displacement that the model expects and the one measured. At the end of each
+   window of HYSTGEN_HEALTH_WINDOW samples the mean and the mean square of the error are stored and
+   judged. Cannot fail. */
+unsigned int hystgen_health_update(hystgen_health_t *self, hystgen_real_t expected,
+                                   hystgen_real_t measured);
 
 #endif

@@ -24,6 +24,8 @@
 #define HYSTGEN_STATUS_DOMAIN 8u
 #define HYSTGEN_STATUS_SLEW_LIMITED 16u
 #define HYSTGEN_STATUS_LIMITED_SETTING 32u
+#define HYSTGEN_STATUS_MODEL_LEFT 64u
+#define HYSTGEN_HEALTH_WINDOW 4096u
 #define HYSTGEN_OPERATOR_INIT_DRIVE 0
 #define HYSTGEN_OPERATOR_INIT_ASCENDING true
 #define HYSTGEN_OPERATOR_RESET_DRIVE 0
@@ -39,6 +41,11 @@ extern const hystgen_play_t hystgen_model_start[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_OUTPUT_MIN (-30000)
 #define HYSTGEN_OUTPUT_MAX 30000
 #define HYSTGEN_CODE_MAX 32767
+#define HYSTGEN_HEALTH_BITS 12u
+#define HYSTGEN_HEALTH_HALVED 1u
+#define HYSTGEN_HEALTH_SHIFT 6u
+#define HYSTGEN_HEALTH_MEAN_MOST 1234
+#define HYSTGEN_HEALTH_SQUARE_MOST 123456789
 #define HYSTGEN_HOLD 2
 #define HYSTGEN_START_STEP 0
 #define HYSTGEN_FRACTION 28u
@@ -53,6 +60,9 @@ extern const hystgen_play_t hystgen_model_zero[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_DRIVE_MAX 4.0f
 #define HYSTGEN_OUTPUT_MIN (-10.0f)
 #define HYSTGEN_OUTPUT_MAX 10.0f
+#define HYSTGEN_HEALTH_SHARE 0.000244140625f
+#define HYSTGEN_HEALTH_MEAN_MOST 0.0001f
+#define HYSTGEN_HEALTH_SQUARE_MOST 0.0004f
 #define HYSTGEN_HOLD 0.001f
 extern const hystgen_curve_t hystgen_operator_curve;
 extern const hystgen_start_t hystgen_operator_start[2];

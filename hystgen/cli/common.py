@@ -166,6 +166,9 @@ effects_option = click.option(
 partial_option = click.option(
     "--allow-partial", is_flag=True, help="leave out effects that the C cannot include; its banner names them"
 )
+health_option = click.option(
+    "--health", is_flag=True, help="add a watch over the model's error: mean, mean square and a status bit"
+)
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,

@@ -58,6 +58,7 @@ class Emitted:
 @common.partial_option
 @common.effects_option
 @click.option("--manifest", is_flag=True, help="also write NAME_manifest.json: hashes, bounds, figures, deviations")
+@common.health_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str | None, check: bool, junit_file: str | None, effects: tuple[str, ...],
@@ -173,7 +174,7 @@ def _word(value: object) -> str | bool:
     return ",".join(value) if isinstance(value, tuple) else value if isinstance(value, str) else True
 
 
-UNSEALED = ("allow_partial", "manifest", "integration")
+UNSEALED = ("allow_partial", "manifest", "integration", "health")
 """Options that a banner does not contain."""
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @common.optimize_option
 @common.layout_option
 @common.partial_option
+@common.health_option
 @common.effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option(

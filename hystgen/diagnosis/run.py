@@ -132,7 +132,7 @@ def diagnose(
         found, made = selection.invertible(found, done.records, P0_FLOOR)
         if done.known is not None:
             found = known_effects.judged(found, done.known, done.records, _refused(found, done, write))
-        extended = write(found)
+        extended = _with_residual(write(found), found, ready)
         result = result_of(
             unit,
             ready,
@@ -364,6 +364,13 @@ def _signals(ready: Prepared, found: Outcome) -> tuple[Signals, ...]:
         for item, before, after in zip(group, found.refitted.errors(group), found.fitted.errors(group), strict=True):
             made.append(Signals(item.name, held_out, item.run.t, item.run.v, item.y, before, after))
     return tuple(made)
+
+
+def _with_residual(parameters: Parameters, found: Outcome, ready: Prepared) -> Parameters:
+    """The parameters with the error that the model leaves on held-out records."""
+    timed = all(item.timed for item in ready.held)
+    step = min(float(np.median(np.diff(item.run.t))) for item in ready.held) if timed else None
+    return parameters.model_copy(update={"residual": quality.residual(found.fitted.errors(ready.held), step)})
 
 
 def _extended(

@@ -39,11 +39,13 @@ def emit_options(
     allow_partial: bool = False,
     manifest: bool = False,
     integration: Sequence[str] = (),
+    health: bool = False,
 ) -> Options:
     """The options to emit with: the arguments given, else the parameter file's `emit` section.
 
     `allow_partial`: effects that the C cannot include are left out, and named in its banner; `manifest`: whether to
-    write a manifest too; `integration`: the tools for which to write packages.
+    write a manifest too; `integration`: the tools for which to write packages; `health`: whether the C watches the
+    model's error.
     """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
@@ -66,7 +68,7 @@ def emit_options(
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
     engine = model.engine(engine, operator, arithmetic, optimize)
-    return Options(operator, arithmetic, engine, layout, left_out, manifest, tools)
+    return Options(operator, arithmetic, engine, layout, left_out, manifest, health, tools)
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
@@ -169,8 +171,9 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     loop; `optimize` auto, speed or size, the goal of `engine` auto; `layout` self-contained, shared-runtime or
     single-header; `allow_partial` leaves out effects that the C cannot include; `manifest` writes NAME_manifest.json as
     well; `integration`: tools for which to write a folder NAME/, among cmake, meson, conan, platformio, arduino, zephyr
-    and espidf. Missing options come from the file. Existing files with the same bytes are left alone. Raises
-    ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError, before anything is written;
+    and espidf; `health` adds a watch over the model's error. Missing options come from the file. Existing files with
+    the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError,
+    before anything is written;
     FileExistsError if a package would replace a file of another origin.
     """
     return write(Path(arguments.path("output", output)), emitted_files(source, **options))

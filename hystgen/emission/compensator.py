@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.compensator.chain.measured import Measured
     from hystgen.compensator.converter import CodeConversion
+    from hystgen.compensator.health import Watch
     from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
@@ -428,7 +429,8 @@ def influence_macros(columns: Sequence[str]) -> list[str]:
 @dataclass(frozen=True)
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain;
-    `conversion`: None unless the inverse has converters."""
+    `conversion`: None unless the inverse has converters; `watch`: None unless the C watches the model's
+    error."""
 
     model: Model
     options: Options
@@ -440,6 +442,7 @@ class EmittedModel:
     compiled: Compiled | None
     glue: Glue | None
     conversion: CodeConversion | None = None
+    watch: Watch | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:

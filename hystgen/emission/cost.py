@@ -38,6 +38,9 @@ class Layout:
         return -(-at // most) * most, most
 
 
+WATCH = "health"
+"""The watch over the model's error among the instances."""
+
 CORE_32 = Layout(integer=4, pointer=4, packed=False)
 AVR = Layout(integer=2, pointer=2, packed=True)
 
@@ -155,11 +158,16 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
     return Cost(code, memory, avr if known else None, worst, dearest)
 
 
-def selftest_bytes(real: int, memory: MemoryBytes, samples: int, codes: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, with `real` bytes per number, and of its pairs of codes; bytes of the instance
-    that its operators share."""
-    sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
-    return samples * sample + 8 * codes, max(size for _, size in memory.instances)
+def selftest_bytes(
+    real: int, fixed: bool, memory: MemoryBytes, samples: int, codes: int, windows: int, layout: Layout
+) -> tuple[int, int]:
+    """Bytes of a self-test's samples, with `real` bytes per number, of its pairs of codes and of its windows; bytes of
+    the instances, one of which its operators share."""
+    number, whole, answers = (real, real), (layout.integer, layout.integer), ((4, 4), (8, 8))
+    sample, _ = layout.struct((1, 1), number, number, whole)
+    window, _ = layout.struct(number, number, number, whole, *(answers if fixed else (number, number)))
+    shared = max(size for each, size in memory.instances if each != WATCH)
+    return samples * sample + 8 * codes + windows * window, shared + dict(memory.instances).get(WATCH, 0)
 
 
 @dataclass(frozen=True)
@@ -234,8 +242,8 @@ def _memory(n: int, options: Options, data: Data, layout: Layout) -> MemoryBytes
     known = sizes(data.types, data.family, layout, lengths)
     a_play, _ = known["corner_t" if options.engine == "corners" else data.family.meaning("play_t")]
     of_plays = [each for table in data.plays for each in table.contents]
-    instances = [(op, known[f"{op}_t"][0]) for op in options.operators]
-    more = _constants(of_plays, known, data.family, n + 1) + a_play * len(instances)
+    instances = [(op, known[f"{op}_t"][0]) for op in (*options.operators, *[WATCH] * options.health)]
+    more = _constants(of_plays, known, data.family, n + 1) + a_play * len(options.operators)
     return MemoryBytes(_constants(data.constants, known, data.family), instances, more)
 
 

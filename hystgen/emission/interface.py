@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import FormatError
+from hystgen.basics.problems import FormatError, duration
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
 from hystgen.compensator.converter import CodeLine
+from hystgen.compensator.health import MODEL_LEFT
 from hystgen.emission import cost, runtime
 from hystgen.emission.compensator import EmittedModel, Macro, influence_macros
 from hystgen.emission.cost import Cost
@@ -56,7 +57,8 @@ def command(parameters: Parameters, options: Options) -> str:
         from hystgen.effects.base import USER
 
         origins = {own_effects.origin(type(each)): None for each in effects if each.name.startswith(USER)}
-    more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    more = " --health" * options.health + " --allow-partial" * bool(options.left_out)
+    more += "".join(f" --effects {shlex.quote(each)}" for each in origins)
     chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
@@ -245,13 +247,16 @@ def _model(one: EmittedModel) -> str:
     return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
 
 
-def selftest_cost(options: Options, found: Cost, samples: int, codes: int) -> list[str]:
-    """The memory that the self-test takes, with this many samples and codes."""
-    real = ARITHMETICS[options.arithmetic].bytes
-    constants, instance = cost.selftest_bytes(real, found.memory, samples, codes, cost.CORE_32)
+def selftest_cost(options: Options, found: Cost, samples: int, codes: int, windows: int) -> list[str]:
+    """The memory that the self-test takes, with this many samples, codes and windows."""
+    arithmetic = ARITHMETICS[options.arithmetic]
+    contents = samples, codes, windows
+    constants, instance = cost.selftest_bytes(
+        arithmetic.bytes, arithmetic.fixed, found.memory, *contents, cost.CORE_32
+    )
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
     if found.avr is not None:
-        both = sum(cost.selftest_bytes(real, found.avr, samples, codes, cost.AVR))
+        both = sum(cost.selftest_bytes(arithmetic.bytes, arithmetic.fixed, found.avr, *contents, cost.AVR))
         lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in total")
     return lines
 
@@ -304,6 +309,7 @@ def limits(one: EmittedModel) -> list[str]:
         ("OUTPUT_MAX", operand(ends.output.high[0]), ""),
     ]
     found += _codes(one)
+    found += _health(one)
     for each in errors(one):
         comment = f"{each.what}, {form.counted(each.side, each.unit)}"
         if each.samples is not None:
@@ -370,6 +376,46 @@ def _codes(one: EmittedModel) -> list[Macro]:
     return found
 
 
+def _health(one: EmittedModel) -> list[Macro]:
+    """Macros about the watch over the model's error."""
+    if one.watch is None:
+        return []
+    band, real = one.watch.band, one.family.arithmetic.real
+    unit = one.units.output or "output units"
+    found = [
+        ("HEALTH_WINDOW", f"{band.window}u", "samples after which the error of the model is judged"),
+        ("HEALTH_MEAN_BAND", literal(real(band.mean)), f"{unit}: largest mean error of a window, either sign"),
+        ("HEALTH_RMS_BAND", literal(real(band.rms)), f"{unit}: largest rms error of a window"),
+    ]
+    if one.family.arithmetic.fixed:
+        found += [
+            ("HEALTH_MEAN_LSB", literal(one.watch.mean_lsb), f"{unit} per unit of health_t.mean"),
+            ("HEALTH_SQUARE_LSB", literal(one.watch.square_lsb), f"({unit})^2 per unit of health_t.mean_square"),
+        ]
+    return found
+
+
+def watched(one: EmittedModel) -> list[str]:
+    """Sentences on the bands of the watch over the model's error, and on false alarms."""
+    if one.watch is None:
+        return []
+    band, seconds = one.watch.band, one.model.parameters.sample_time
+    unit = f" {one.units.output}" if one.units.output else ""
+    lasts = "" if seconds is None else f" ({duration(band.window * seconds)})"
+    said = (
+        f"Health: over {band.window} samples{lasts} the mean error stays within {band.mean:.4g}{unit} and the rms "
+        f"error within {band.rms:.4g}{unit}; "
+    )
+    found = one.model.parameters.residual
+    if band.false_alarms is None or found is None or seconds is None:
+        return [said + "this band comes from the parameter file, so the rate of false alarms is unknown"]
+    return [said + (
+        f"a window of a healthy unit leaves these bands with probability {band.false_alarms:.3g}, about once in "
+        f"{duration(band.window * seconds / band.false_alarms)}. They follow from a residual of {found.rms:.4g}{unit} "
+        f"in {found.samples:.3g} independent samples; a window has {band.independent:.3g}"
+    ) + ". The mean holds for a zero of the sensor that is the mean of an earlier window"]
+
+
 def _timing(one: EmittedModel) -> list[Macro]:
     """Macros about time: the sample time, and for a model with effects its consequences."""
     kind, period, compiled = one.family.arithmetic.real, one.model.parameters.sample_time, one.compiled
@@ -423,7 +469,11 @@ def status(one: EmittedModel) -> list[str]:
             ("SLEW_LIMITED", slewed if one.variant.slew else "never set: nothing limits the drive's rate"),
             ("LIMITED_SETTING", "an offset, gain, temperature or column was limited"),
         ]
-    return _defined(one, ((f"STATUS_{name}", f"{1 << bit}u", words) for bit, (name, words) in enumerate(found)))
+    bits: list[Macro] = [(f"STATUS_{name}", f"{1 << bit}u", words) for bit, (name, words) in enumerate(found)]
+    if one.watch:
+        words = "returned by health_update: the error of the model is outside its band"
+        bits.append(("STATUS_MODEL_LEFT", f"{MODEL_LEFT}u", words))
+    return _defined(one, bits)
 
 
 # Calls
@@ -458,6 +508,11 @@ CALLS = {
     "set_temperature": CallFacts(_FIRST, _FEW, _SET),
     "set_influence": CallFacts(_FIRST, "a few operations and those of the column's plays, less than a step", _SET),
     "set_gain": CallFacts(_FIRST, _FEW, _SET),
+    "health_init": CallFacts("before health_update; may be repeated at any time", "six stores"),
+    "health_update": CallFacts(
+        "after health_init; once every sample time", "at most 40 instructions on a Cortex-M4F, except in float64",
+        ("MODEL_LEFT",),
+    ),
     "travel": CallFacts(_FIRST, "one load"),
     "set_travel": CallFacts("after init and before the first step, or at any time", _FEW, _SET),
     "expected": CallFacts("after a step, a commit or settle", _FEW),
@@ -519,7 +574,7 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
     form, macros = one.form, one.names.NAME
     if name == "self":
         return "the instance"
-    held = form.unless_held(call)
+    held = "" if call.startswith("health") else form.unless_held(call)
     if name in form.settings:
         return form.settings[name].replace("MODEL", macros) + held
     drive = _unit("drive", one) + f"; limited to {macros}_DRIVE_MIN .. MAX"
@@ -528,7 +583,10 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         "u": _unit("reference", one) + f"; limited to {macros}_OUTPUT_MIN .. MAX",
         "applied": drive,
         "d": _unit("output", one),
-        "measured": _unit("output", one),
+        "measured": _unit("output", one) + "; a sample with NaN or infinity is skipped" * (
+            call == "health_update" and not one.family.arithmetic.fixed
+        ),
+        "expected": _unit("output", one) + f", {expected(one)}",
         "i": f"index of the column, one of {macros}_INFLUENCE_*; any other is ignored, and reported as limited",
         "travel": "total distance that the drive has moved, in units of the drive",
         "code": f"code of the converter, {macros}_{'DRIVE' if call == 'drive_from_code' else 'REFERENCE'}_CODE_MIN .. "
@@ -538,6 +596,16 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
     return what + held * (name not in ("code", "drive"))
 
 
+def expected(one: EmittedModel) -> str:
+    """Where the displacement that the model expects comes from."""
+    own = one.names.name
+    if "expected" in one.calls.get("inverse", ()):
+        return f"as {own}_inverse_expected gives it for the drive applied when it was measured"
+    if "forward" in one.options.operators:
+        return f"as {own}_forward_step gives it for the drive applied when it was measured"
+    return f"that is the reference, within {one.names.NAME}_OUTPUT_MIN .. MAX, unless the drive was limited or replaced"
+
+
 def _answer(call: str, op: str | None, one: EmittedModel) -> str:
     if call in ("step_code", "code_from_drive"):
         return f"code of the drive's converter, {one.names.NAME}_DRIVE_CODE_MIN .. MAX"
@@ -545,6 +613,8 @@ def _answer(call: str, op: str | None, one: EmittedModel) -> str:
         return _unit(call.partition("_")[0], one)
     if call == "status":
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
+    if call == "health_update":
+        return f"{one.names.NAME}_STATUS_MODEL_LEFT if the last whole window is outside its band, else 0"
     if call == "travel":
         return "total distance that the drive has moved, in units of the drive"
     return _unit("drive" if op == "inverse" and call == "step" else "output", one)

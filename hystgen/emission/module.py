@@ -50,11 +50,16 @@ def compensator(model: Model, options: Options) -> EmittedModel:
         variant = dataclasses.replace(variant, coded=True)
         macros = ((name, operand(value), "") for name, value in conversion.macros)
         numbers = dataclasses.replace(numbers, macros=(*numbers.macros, *macros))
+    watch = model.watch(options.arithmetic, options.engine, bool(options.left_out)) if options.health else None
+    if watch:
+        variant = dataclasses.replace(variant, watched=True)
+        macros = ((name, operand(value), "") for name, value in watch.macros)
+        numbers = dataclasses.replace(numbers, macros=(*numbers.macros, *macros))
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
     elif loop:
         glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
-    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue, conversion)
+    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue, conversion, watch)
 
 
 def _variant(
@@ -146,7 +151,8 @@ def composed(one: EmittedModel) -> Code:
     states = runtime.needed(own_types, [f"hystgen_{op}_t" for op in operators])
     kinds = [f"hystgen_{kind}" for kind, _ in contents]
     tables = [piece for piece in runtime.needed(own_types, [*called, *kinds]) if piece not in states]
-    shown = runtime.render_operators(states, names.name, one.corners, names.rt, family)
+    watch = runtime.watch_pieces(one.variant)
+    shown = runtime.render_operators([*states, *watch], names.name, one.corners, names.rt, family)
     if one.corners and not shared:
         shown = f"{runtime.all_types(memory, names.rt, family)}\n{shown}"
     return Code(
@@ -162,7 +168,7 @@ def composed(one: EmittedModel) -> Code:
         plays=tuple(plays),
         beside=tuple(beside),
         data=Data(
-            family, [*memory, *of_tables, *tables, *states], plays,
+            family, [*memory, *of_tables, *tables, *states, *watch], plays,
             [*contents, *(each for piece in (*kernels, *pieces, *tables) for each in piece.contents)],
         ),
     )
@@ -227,7 +233,7 @@ def of(model: Model, options: Options, sha256: str = "") -> Module:
         dynamic = doubts.found(model.parameters, one.compiled)
     return Module(
         one, made, cost.estimate(model.cascade, options, one.numbers.tables, made.data),
-        sha256 or parameters_sha256(model.parameters), interface.reading(one),
+        sha256 or parameters_sha256(model.parameters), [*interface.reading(one), *interface.watched(one)],
         [*dynamic, *interface.unbounded(one), *interface.misread(one)],
     )
 
@@ -261,14 +267,16 @@ def files(module: Module) -> dict[str, str]:
     if shared:
         found |= runtime_files(options.arithmetic)
     operators = selftest.operators(one)
-    codes = selftest.codes(one)
-    costs = interface.selftest_cost(options, module.cost, sum(len(each.samples) for each in operators), len(codes))
+    codes, windows = selftest.codes(one), selftest.windows(one)
+    samples = sum(len(each.samples) for each in operators)
+    costs = interface.selftest_cost(options, module.cost, samples, len(codes), len(windows))
     for ending, about, more in (
         (".h", f"checks {name} on the target", costs),
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        text = template(f"selftest{ending}.j2", operators=operators, codes=codes, unread=slots.OP_UNREAD)
+        text = template(f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows,
+                        fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD)
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}

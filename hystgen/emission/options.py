@@ -35,7 +35,7 @@ class Options:
     """The options of emission: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
 
     `left_out`: a sentence for each effect that the C leaves out, if that is allowed; `manifest`: whether to write one;
-    `integration`: the tools for which to write packages.
+    `health`: whether the C watches the model's error; `integration`: the tools for which to write packages.
     """
 
     operator: str
@@ -44,6 +44,7 @@ class Options:
     layout: str
     left_out: tuple[str, ...] = ()
     manifest: bool = False
+    health: bool = False
     integration: tuple[str, ...] = ()
 
     @property

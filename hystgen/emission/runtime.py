@@ -78,6 +78,9 @@ CODED = (
 )
 """Calls of an inverse with converters."""
 
+WATCHING = ("hystgen_health_init", "hystgen_health_update")
+"""Calls of a watch over the model's error."""
+
 
 @dataclass(frozen=True)
 class Family(ABC):
@@ -252,7 +255,8 @@ class Variant:
     `waiting`: number of delayed drives; `taps`: number of references that are summed; `calls`: those that its blocks
     add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
     `elements`: number of elements in parallel with them; `tilted`: their drive is; `late_column`: a column acts
-    through a lag; `coded`: the inverse takes and returns codes of converters.
+    through a lag; `coded`: the inverse takes and returns codes of converters; `watched`: the C watches the model's
+    error.
     """
 
     engine: str
@@ -276,6 +280,7 @@ class Variant:
     tilted: bool = False
     late_column: bool = False
     coded: bool = False
+    watched: bool = False
 
     @property
     def apart(self) -> tuple[str, ...]:
@@ -319,7 +324,8 @@ class Variant:
         files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         converter = ("compensator/converter.c",) * self.coded
-        return (*files, "compensator/drive.c", *own, "compensator/status.c", *converter)
+        watch = ("compensator/health.c",) * self.watched
+        return (*files, "compensator/drive.c", *own, "compensator/status.c", *converter, *watch)
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
@@ -619,8 +625,8 @@ def piece_of(text: str) -> Piece:
 def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
     """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
     every = {piece.name: piece for piece in _pieces(["compensator/api.h"], ())}
-    coded = [every[name] for name in CODED] if variant.coded else []
-    return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *coded]
+    more = [every[name] for name in (*CODED * variant.coded, *WATCHING * variant.watched)]
+    return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *more]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
@@ -636,6 +642,11 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str]) -> 
     """The types of instances."""
     every = _pieces([CORNER_STATE], family.facts | variant.facts)
     return needed(every, [f"hystgen_{op}_t" for op in operators])
+
+
+def watch_pieces(variant: Variant) -> list[Piece]:
+    """The type of a watch over the model's error, all of whose members are for users."""
+    return _pieces(["compensator/health.h"], variant.family.facts) if variant.watched else []
 
 
 def with_members(piece: Piece, kept: Iterable[Field]) -> Piece:

@@ -96,6 +96,44 @@ def codes(one: EmittedModel) -> list[tuple[str, str]]:
     return [(literal(a), literal(b)) for a, b in zip(given, sent, strict=True)]
 
 
+SHARES = ((0.5, -0.5), (2.0, 2.0), (2.0, -2.0))
+"""[fraction of the band for the rms] Errors of even and odd samples: inside, a mean outside, a mean square outside."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A window of the watch: what is expected, what even and odd samples measure, and the answers; as written in C."""
+
+    expected: str
+    even: str
+    odd: str
+    status: int
+    mean: str
+    mean_square: str
+
+
+def windows(one: EmittedModel) -> list[Window]:
+    """Windows of a watch over the model's error, each from init."""
+    watch, kind = one.watch, one.family.arithmetic.number
+    if watch is None:
+        return []
+    low, high = (float(end) for end in one.numbers.tables.limits.output[0])
+    middle = reference.nearest(one.numbers.tables, np.array([(low + high) / 2.0]))[0]
+    band = watch.band.rms / float(one.numbers.lsb[1] if one.numbers.lsb else 1)
+    found = []
+    for errors in SHARES:
+        measured = float(middle) + np.array(errors) * band
+        if kind.kind == "i":
+            measured = np.clip(np.rint(measured), np.iinfo(kind).min, np.iinfo(kind).max)
+        even, odd = (kind.type(each) for each in measured)
+        values = np.resize(np.array([even, odd]), watch.band.window)
+        answer = watch.update(np.full(len(values), middle).astype(kind), values)
+        status, mean, square = (each[-1] for each in answer)
+        found.append(Window(literal(kind.type(middle)), literal(even), literal(odd), int(status), literal(mean),
+                            literal(square)))
+    return found
+
+
 def _setting(t: ChainTables, code: int, call: str, turn: int) -> float:
     """An argument for a setting, in fixed point before rounding to a code. Every third argument exceeds the limits, if
     there are any."""

@@ -215,6 +215,8 @@ def identify(
     offset = rounded(errors[0].offset, pi.DIGITS)
     step = next((rounded(record.sample_time, STEP_DIGITS) for record in fit_records if record.timed), None)
     parameters = _parameters(name, units, step, drive, fitted, offset, compared[0])
+    judged = [each.error for each in held_errors or errors]
+    parameters = parameters.model_copy(update={"residual": quality.residual(judged, step)})
     said = verdict.verdict(errors, held_errors, quality.direction(fitted), (units or {}).get("output", ""))
     if strict and said.useless:
         raise UselessError(f"{fit_records[0].name}: the model is of no use: {said.why}")

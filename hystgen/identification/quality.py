@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -16,6 +17,7 @@ from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import FreeRunErrors, Weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.start import STARTS, UNLIKE
+from hystgen.parameters.schema import Residual
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -272,6 +274,21 @@ def correlation_time(e: Array) -> float:
     pairs = rho[1 : n - 1 : 2] + rho[2:n:2]
     ends = np.flatnonzero(pairs <= 0.0)
     return float(max(1.0, 1.0 + 2.0 * np.sum(pairs[: ends[0] if len(ends) else len(pairs)])))
+
+
+def residual(errors: Sequence[Array], step: float | None) -> Residual | None:
+    """What a parameter file says about a fit's errors, NaN where not compared; `step`: sample time in s.
+
+    None without a time or an error."""
+    known = [e[np.isfinite(e)] for e in errors]
+    squares, samples = float(sum(np.sum(e**2) for e in known)), sum(map(len, known))
+    if step is None or not squares > 0.0:
+        return None
+    tau = sum(max(correlation_time(e), correlation_time(e**2)) * len(e) for e in known) / samples
+    return Residual(
+        rms=pi.rounded(math.sqrt(squares / samples), pi.DIGITS), correlation=pi.rounded(tau * step, pi.DIGITS),
+        samples=pi.rounded(max(samples / tau, 1.0), pi.DIGITS),
+    )
 
 
 def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple[float, float]:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 KEPT_KEYS = ("description", "sample_time", "emit")
 
-MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate": "input"}
+MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate": "input",
+            "health.band": "output"}
 """Keys of `emit` with numbers in units of the drive or the displacement, or in those units per second."""
 
 

@@ -46,6 +46,8 @@ _PARTS: dict[str, type[BaseModel]] = {
     "converter": schema.Converters,
     "reference": schema.Converter,
     "drive": schema.Converter,
+    "health": schema.Health,
+    "residual": schema.Residual,
 }
 
 _PLACES: dict[str, type[BaseModel]] = {
@@ -54,6 +56,7 @@ _PLACES: dict[str, type[BaseModel]] = {
     "in model.pi": schema.PIParameters,
     "in emit": schema.EmitDefaults,
     "in emit.compensation": schema.Compensation,
+    "in emit.health": schema.Health,
 }
 """The place where a misplaced key belongs, in words, with that place's keys."""
 
@@ -265,6 +268,10 @@ class _Checker:
             self.add(("input_range",), f"{shown(ends[0])} is not below {shown(ends[1])}; write [lowest, highest]")
         for side in ("reference", "drive"):
             self._converter(("emit", "converter", side), ends if side == "drive" else None)
+        window = self.get("emit", "health", "window")
+        if window is not None and window & (window - 1):
+            near = 1 << (window.bit_length() - 1)
+            self.add(("emit", "health", "window"), f"must be a power of 2, not {window}; give {near} or {2 * near}")
         if isinstance(self.at(("model", "pi")), Mapping):
             self._pi(("model", "pi"))
         stages = self.at(("model", "memoryless"))

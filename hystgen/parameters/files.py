@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
 from hystgen.parameters.checks import check
-from hystgen.parameters.schema import Compensation, ModelParameters, PIParameters
+from hystgen.parameters.schema import Compensation, Health, ModelParameters, PIParameters
 from hystgen.parameters.schema import Parameters as Parameters
 from hystgen.parameters.yaml import MAX_BYTES, read, resolve
 
@@ -148,8 +148,8 @@ def canonical_json(parameters: Parameters) -> str:
 
     A density appears as given, not as the plays made from it. `emit.output` is left out, since the C does not depend on
     its folder, and `recorded_at`, which changes nothing. Keys added later (`emit.optimize`, `emit.compensation`,
-    `emit.converter`, `not_separable` and some in effects) appear only if they differ from the default, so that files
-    without them keep their hash.
+    `emit.converter`, `emit.health`, `residual`, `not_separable` and some in effects) appear only if they differ from
+    the default, so that files without them keep their hash.
     """
     data = _data(parameters)
     del data["emit"]["output"]
@@ -161,6 +161,10 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["compensation"]["compensate"]
     if parameters.emit.converter is None:
         data["emit"].pop("converter", None)
+    if parameters.emit.health == Health():
+        del data["emit"]["health"]
+    if parameters.residual is None:
+        data.pop("residual", None)
     if not parameters.not_separable:
         del data["not_separable"]
     del data["recorded_at"]

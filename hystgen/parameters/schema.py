@@ -288,6 +288,30 @@ class Converters(_Part):
     drive: Converter = Field(description="destination of drives: input units")
 
 
+class Health(_Part):
+    """The watch over the model's error that `emit --health` adds."""
+
+    window: Annotated[int, Field(ge=1, le=2**16)] | None = Field(
+        default=None, description="samples after which mean and mean square are judged, a power of 2; auto: enough"
+    )
+    false_alarms: Annotated[float, Field(gt=0.0, le=0.1)] = Field(
+        default=1e-6, description="probability that a window of a healthy unit raises an alarm"
+    )
+    band: Positive | None = Field(
+        default=None, description="largest rms error of a window, output units, in place of one derived from `residual`"
+    )
+
+    _window = field_validator("window", mode="before")(_auto)
+
+
+class Residual(_Part):
+    """Error of the identified model on records that took no part in the fit."""
+
+    rms: Positive = Field(description="rms error, output units")
+    correlation: Positive = Field(description="time in s over which the error or its square stays correlated")
+    samples: Annotated[float, Field(ge=1.0)] = Field(description="number of independent samples of the error")
+
+
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
 
@@ -310,6 +334,7 @@ class EmitDefaults(_Part):
     converter: Converters | None = Field(
         default=None, description="converters of references and drives, for steps of the inverse from code to code"
     )
+    health: Health = Field(default=Health(), description="bands of the watch that --health adds")
 
 
 class Parameters(_Part):
@@ -338,6 +363,9 @@ class Parameters(_Part):
     )
     model: ModelParameters = Field(description="what the actuator does")
     emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
+    residual: Residual | None = Field(
+        default=None, description="error that identification left, with which monitor and --health compare later ones"
+    )
     not_separable: tuple[tuple[str, str], ...] = Field(
         default=(), description="pairs of an effect that a diagnosis named and one that the records leave possible"
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hystgen.compensator import converter, reference
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.converter import CodeConversion
+from hystgen.compensator.health import Watch
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
@@ -85,13 +86,49 @@ def expected_codes(
     return ExpectedCodes(codes.astype(np.int32), found)
 
 
+@dataclass(frozen=True)
+class ExpectedHealth:
+    """Displacements for a watch over the model's error, and the reference's results for them by name."""
+
+    expected: NDArray[np.number]
+    measured: NDArray[np.number]
+    results: Mapping[str, NDArray[np.number]]
+
+
+def expected_health(real: np.dtype[np.number], watch: Watch, lsb: float, length: int) -> ExpectedHealth:
+    """Displacements with errors around the band and far beyond it, with the results of the bit-exact reference; `lsb`:
+    output units per number."""
+    expected, measured = signals.displacements(real, watch.band, lsb, length)
+    own = (real, real) if real.kind == "f" else (np.dtype("int32"), np.dtype("int64"))
+    names, kinds = ("status", "mean", "mean_square"), (np.dtype("uint32"), *own)
+    answers = watch.update(expected, measured)
+    results = {name: each.astype(kind) for name, kind, each in zip(names, kinds, answers, strict=True)}
+    return ExpectedHealth(expected, measured, results)
+
+
+def compare_health(
+    run: Callable[..., Sequence[NDArray[np.number]]], expected: ExpectedHealth
+) -> Mismatch:
+    """Compare the compiled results of a watch over the model's error, bit for bit; `run`: takes expected and measured
+    displacements and the types of the results."""
+    kinds = [each.dtype for each in expected.results.values()]
+    return _compare_results(run(expected.expected, expected.measured, kinds), expected.results)
+
+
 def compare_codes(
     run: Callable[[NDArray[np.int32]], Sequence[NDArray[np.number]]], expected: ExpectedCodes
 ) -> Mismatch:
     """Compare the compiled results for codes, bit for bit."""
+    return _compare_results(run(expected.codes), expected.results)
+
+
+def _compare_results(
+    results: Sequence[NDArray[np.number]], expected: Mapping[str, NDArray[np.number]]
+) -> Mismatch:
+    """Compare compiled results, one per name and sample, bit for bit."""
     different = 0
     first, worst = "", 0.0
-    for found, (name, wanted) in zip(run(expected.codes), expected.results.items(), strict=True):
+    for found, (name, wanted) in zip(results, expected.items(), strict=True):
         wanted = wanted.astype(found.dtype)
         bits = np.dtype(f"u{found.itemsize}")
         wrong = found.view(bits) != wanted.view(bits)
@@ -99,7 +136,7 @@ def compare_codes(
         if wrong.any():
             first = first or f"sample {int(np.argmax(wrong))} of {name}"
             worst = max(worst, _ulps(found[wrong], wanted[wrong]))
-    return Mismatch(len(expected.codes), different, worst if np.isfinite(worst) else None, first)
+    return Mismatch(len(results[0]), different, worst if np.isfinite(worst) else None, first)
 
 
 def _ulps(a: NDArray[np.number], b: NDArray[np.number]) -> float:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from hystgen.verification import compilers, cross, emulator, firmware
-from hystgen.verification.comparison import Expected, compare
+from hystgen.verification.comparison import Expected, ExpectedHealth, compare, compare_health
 from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Target
@@ -23,9 +24,11 @@ def rows(
     compiler: Sequence[str],
     folder: Path,
     progress: Callable[[str], None],
+    health: ExpectedHealth | None = None,
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build. For a core with an FPU, there is also a build without flags, in which
-    compilers may contract a product and a sum, with a row for the self-test; if qemu is installed, the self-test also
+    """One row per operator, compiler and build, and one for the watch over the model's error. For a core with an FPU,
+    there is also a build without flags, in which compilers may contract a product and a sum, with a row for the
+    self-test; if qemu is installed, the self-test also
     runs as a whole firmware.
     """
     try:
@@ -43,7 +46,7 @@ def rows(
         for build, flags in builds:
             progress(f"{target.name}, {name} {build}")
             place = folder / f"{target.name}-{name}-{build}-{next(_fresh)}"
-            yield from _emulated(target, found, build, flags, sources, records, place)
+            yield from _emulated(target, found, build, flags, sources, records, place, health)
         machine = firmware.available(target)
         if machine:
             progress(f"{target.name}, {name}, firmware on {machine.name}")
@@ -64,6 +67,7 @@ def _emulated(
     sources: Sources,
     records: Callable[[str], Sequence[Expected]],
     folder: Path,
+    health: ExpectedHealth | None,
 ) -> Iterator[Row]:
     try:
         path = compiler.image(sources, folder, flags, cross.MemoryMap(), f"{sources.name}_selftest")
@@ -93,6 +97,15 @@ def _emulated(
             ram=size,
             stack=core.stack,
         )
+    if health is not None:
+        row = Row(target.name, compiler.name, build, "health")
+        try:
+            core = emulator.Core(target, image)
+            outcome = compare_health(functools.partial(core.health, sources.name), health)
+            mean, most = round(float(core.counts.mean()), 2), int(core.counts.max())
+            yield replace(row, **vars(outcome), mean_instructions=mean, max_instructions=most)
+        except (compilers.MissingError, emulator.EmulatorError) as error:
+            yield failed(row, error)
     row = Row(target.name, compiler.name, build, "selftest")
     try:
         row = selftest(row, sources.name, emulator.Core(target, image).call(f"{sources.name}_selftest"))

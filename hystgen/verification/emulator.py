@@ -6,7 +6,7 @@ import contextlib
 import ctypes
 import functools
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -206,15 +206,7 @@ class Core:
     ) -> tuple[NDArray[np.number], Bytes]:
         """Let the harness of operator `op` make the calls in a record, counting the instructions of NAME_OP_step or
         NAME_OP_commit."""
-        sizes = (len(x), x.nbytes, x.nbytes, len(x))
-        places, end = [], RECORDS
-        for size in sizes:
-            places.append(end)
-            end += -(-size // 16) * 16
-        needed = -(-(end - RECORDS) // PAGE) * PAGE
-        if needed > self._records:
-            self._uc.mem_map(RECORDS + self._records, needed - self._records)
-            self._records = needed
+        places = self._places(len(x), x.nbytes, x.nbytes, len(x))
         self._uc.mem_write(places[0], call.tobytes())
         self._uc.mem_write(places[1], x.tobytes())
         code = slots.OP_STEP if counted == "step" else slots.OP_COMMIT
@@ -223,6 +215,36 @@ class Core:
         answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)
         status = np.frombuffer(bytes(self._uc.mem_read(places[3], len(x))), dtype=np.uint8)
         return answer, status
+
+    def health(
+        self, name: str, expected: NDArray[np.number], measured: NDArray[np.number],
+        kinds: Sequence[np.dtype[np.number]],
+    ) -> list[NDArray[np.number]]:
+        """Let the harness watch the model's error, counting the instructions of NAME_health_update; `kinds`: types of
+        the results."""
+        count = len(expected)
+        results = [np.empty(count, dtype=kind) for kind in kinds]
+        places = self._places(*(each.nbytes for each in (expected, measured, *results)))
+        for place, each in zip(places[:2], (expected, measured), strict=True):
+            self._uc.mem_write(place, each.tobytes())
+        with self._counting(f"{name}_health_update", "health", count):
+            self.call("hystgen_harness_health", *places, count)
+        return [
+            np.frombuffer(bytes(self._uc.mem_read(place, each.nbytes)), dtype=each.dtype)
+            for place, each in zip(places[2:], results, strict=True)
+        ]
+
+    def _places(self, *sizes: int) -> list[int]:
+        """Addresses of records of these sizes in bytes, in memory that is there."""
+        places, end = [], RECORDS
+        for size in sizes:
+            places.append(end)
+            end += -(-size // 16) * 16
+        needed = -(-(end - RECORDS) // PAGE) * PAGE
+        if needed > self._records:
+            self._uc.mem_map(RECORDS + self._records, needed - self._records)
+            self._records = needed
+        return places
 
     @contextlib.contextmanager
     def _counting(self, function: str, op: str, calls: int) -> Iterator[None]:

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
-from hystgen.verification.comparison import Expected, ExpectedCodes, compare, compare_codes
+from hystgen.verification.comparison import (
+    Expected,
+    ExpectedCodes,
+    ExpectedHealth,
+    compare,
+    compare_codes,
+    compare_health,
+)
 from hystgen.verification.loading import LoadError, load
 from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
@@ -39,6 +46,8 @@ class _Library:
             )
         if sources.coded:
             self._ffi.cdef(f"void hystgen_harness_codes({', '.join(['void *'] * 6)}, size_t count);")
+        if sources.watched:
+            self._ffi.cdef(f"void hystgen_harness_health({', '.join(['void *'] * 5)}, size_t count);")
         self._lib = load(path, self._ffi.dlopen)
 
     def selftest(self) -> int:
@@ -69,6 +78,16 @@ class _Library:
         )
         return found
 
+    def health(
+        self, expected: NDArray[np.number], measured: NDArray[np.number], kinds: Sequence[np.dtype[np.number]]
+    ) -> list[NDArray[np.number]]:
+        """The harness's results, of these types, for a watch over the model's error."""
+        found = [np.zeros(len(expected), dtype=kind) for kind in kinds]
+        self._lib.hystgen_harness_health(
+            *(self._ffi.cast("void *", each.ctypes.data) for each in (expected, measured, *found)), len(expected)
+        )
+        return found
+
     def close(self) -> None:
         self._ffi.dlclose(self._lib)
 
@@ -81,9 +100,10 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
     codes: ExpectedCodes | None = None,
+    health: ExpectedHealth | None = None,
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build, and one for `codes` of converters; compilers: the given ones, else all
-    that are installed."""
+    """One row per operator, compiler and build, one for `codes` of converters and one for the watch over the model's
+    error; compilers: the given ones, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
         yield failed(Row(HOST, "-", "-", "-"), compilers.none_found())
@@ -106,6 +126,8 @@ def rows(
                 yield Row(HOST, name, build, op, **vars(outcome), ram=library.size(op))
             if codes is not None:
                 yield Row(HOST, name, build, "codes", **vars(compare_codes(library.codes, codes)))
+            if health is not None:
+                yield Row(HOST, name, build, "health", **vars(compare_health(library.health, health)))
             row = selftest(Row(HOST, name, build, "selftest"), sources.name, library.selftest())
             library.close()
             if not row.ok:

@@ -14,12 +14,22 @@ from hystgen.emission.calls import emit_options, emitted_model
 from hystgen.model import ModelSource, as_model
 from hystgen.parameters.files import parameters_sha256
 from hystgen.verification import avr, cores, host, sources
-from hystgen.verification.comparison import Expected, ExpectedCodes, expected_codes, expected_records
+from hystgen.verification.comparison import (
+    Expected,
+    ExpectedCodes,
+    ExpectedHealth,
+    expected_codes,
+    expected_health,
+    expected_records,
+)
 from hystgen.verification.report import Report, Row
 from hystgen.verification.targets import AVR, HOST, Board, find
 
 CODES = 3_000
 """[samples] Maximum number of steps from code to code; the reference takes about 0.1 ms for each."""
+
+WINDOWS = 12
+"""[windows] Least number of windows over which the watch over the model's error is compared."""
 
 
 @arguments.checked
@@ -35,6 +45,7 @@ def verify(
     target_length: int | None = None,
     optimize: str | None = None,
     allow_partial: bool = False,
+    health: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
@@ -45,6 +56,7 @@ def verify(
     installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as the speed of
     that core allows), and counts the instructions of every sample. On the AVR only the emitted self-test runs. Names
     given twice are used once. A requested tool that is missing on this machine gives a row marked `missing`.
+    With `health` the watch over the model's error is compared too, on the host.
     `hystgen.verification.Reports` joins the reports of several models. Raises what `emit` raises, and ValueError for a
     target that does not exist.
 
@@ -60,7 +72,7 @@ def verify(
     if target_length is not None:
         arguments.whole("target_length", target_length, "calls", 1)
     model = as_model(source)
-    options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial)
+    options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial, health=health)
     parameters = parameters_sha256(model.parameters)
     model = emitted_model(model, options)
     numbers = model.tables(options.arithmetic, options.engine, options.operator)
@@ -78,6 +90,14 @@ def verify(
         conversion = model.conversion(options.arithmetic, options.engine) if options.inverse else None
         return None if conversion is None else expected_codes(numbers, real, conversion, min(length, CODES))
 
+    @functools.cache
+    def watched(length: int) -> ExpectedHealth | None:
+        if not health:
+            return None
+        watch = model.watch(options.arithmetic, options.engine, bool(options.left_out))
+        lsb = model.units_per_code(options.arithmetic, options.engine)[1] if real.kind == "i" else 1.0
+        return expected_health(real, watch, lsb, max(length, WINDOWS * watch.band.window))
+
     with writing.temporary() as folder:
         written = sources.write(folder, model, options, parameters)
         sha256 = {"parameters": parameters, **written.sha256}
@@ -86,7 +106,7 @@ def verify(
             begun = time.perf_counter()
             if target is None:
                 wanted = functools.partial(records, length)
-                found = host.rows(written, wanted, real, compiler, folder, progress, codes())
+                found = host.rows(written, wanted, real, compiler, folder, progress, codes(), watched(length))
                 report.rows.extend(_timed(begun, found))
             elif isinstance(target, Board):
                 memory = module.of(model, options).cost.avr
@@ -94,7 +114,9 @@ def verify(
                 report.rows.extend(_timed(begun, avr.rows(target, written, size, compiler, folder, progress)))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
-                report.rows.extend(_timed(begun, cores.rows(target, written, wanted, compiler, folder, progress)))
+                checked = watched(target_length or target.calls)
+                found = cores.rows(target, written, wanted, compiler, folder, progress, checked)
+                report.rows.extend(_timed(begun, found))
     return report
 
 

@@ -14,6 +14,7 @@ from hystgen.compensator import reference
 from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.converter import CodeConversion
+from hystgen.compensator.health import Band
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
 from hystgen.plays import slots
@@ -126,6 +127,32 @@ def codes(conversion: CodeConversion, length: int) -> NDArray[np.int64]:
     drawn = [rng.integers(line.least, line.most, length, endpoint=True) for line in lines]
     found: NDArray[np.int64] = np.rint(np.concatenate([[word.min, word.max], *ends, sweeps, *drawn])).astype(np.int64)
     return found[:length]
+
+
+def displacements(
+    real: np.dtype[Any], band: Band, lsb: float, length: int
+) -> tuple[NDArray[np.number], NDArray[np.number]]:
+    """Expected and measured displacements (length,), the same every time: blocks with errors from a tenth of the band
+    to three times, with and without a mean; in the last tenth, extremes and numbers that are none."""
+    rng = np.random.default_rng(20261205)
+    count = max(length // max(band.window, 1), 12)
+    block = -(-length // count)
+    sizes = np.repeat(10.0 ** rng.uniform(-1.0, 0.5, count), block)[:length]
+    shift = np.repeat(rng.uniform(-2.0, 2.0, count) * (rng.random(count) < 0.5), block)[:length]
+    expected = 100.0 * band.rms * np.cumsum(rng.normal(0.0, 0.01, length)) / lsb
+    measured = expected + (band.rms * sizes * rng.normal(0.0, 1.0, length) + shift * band.mean) / lsb
+    if real.kind == "i":
+        least, most = float(np.iinfo(real).min), float(np.iinfo(real).max)
+        special = np.array([least, most, 0.0])
+    else:
+        most = float(np.finfo(real).max)
+        special = np.array([np.nan, np.inf, -np.inf, most, -most, 1e19, 0.0])
+    for each in (expected, measured):
+        odd = (rng.random(length) < 0.01) & (np.arange(length) >= 0.9 * length)
+        each[odd] = rng.choice(special, int(odd.sum()))
+    if real.kind == "i":
+        expected, measured = (np.clip(np.rint(each), least, most) for each in (expected, measured))
+    return expected.astype(real), measured.astype(real)
 
 
 def suite(

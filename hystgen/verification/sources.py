@@ -32,6 +32,7 @@ class Sources:
     selftest: Path | None = None  # code that is not emitted has none
     sha256: Mapping[str, str] = field(default_factory=dict)
     coded: bool = False  # whether the inverse steps from code to code
+    watched: bool = False  # whether the error of the model is watched
 
     @property
     def emitted(self) -> tuple[Path, ...]:
@@ -51,13 +52,16 @@ def harness(
     arithmetic: Arithmetic = FLOAT32,
     coded: bool = False,
     columns: int = 0,
+    watched: bool = False,
 ) -> str:
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator;
-    `coded`: whether the inverse steps from code to code; `columns`: number of those that are set."""
+    `coded`: whether the inverse steps from code to code; `columns`: number of those that are set; `watched`: whether
+    the error of the model is watched."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic, columns)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
-        chain=chain, coded=coded,
+        chain=chain, coded=coded, watched=watched,
+        means=("int32_t", "int64_t") if arithmetic.fixed else (f"{name}_real_t",) * 2,
     )
 
 
@@ -88,12 +92,13 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     name = model.name
     emitted = module.of(model, options, parameters)
     texts, calls, coded = module.files(emitted), emitted.compensator.calls, emitted.compensator.variant.coded
+    watched = emitted.compensator.variant.watched
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(
-        name, options.operators, calls, ARITHMETICS[options.arithmetic], coded, len(emitted.compensator.columns)
-    )
+    arithmetic = ARITHMETICS[options.arithmetic]
+    columns = len(emitted.compensator.columns)
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, columns, watched)
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded)
+    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded, watched)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -27,6 +28,7 @@ from hystgen.diagnosis.findings.kinds import (
 )
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
+from hystgen.front.stage import Stage
 from hystgen.identification import faults, pi, prepared, start
 from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
@@ -349,6 +351,25 @@ def to_judge(
         items = sound
         notes += [each.sentence(None) for each in merged(wrong)]
     return items, [*notes, *hardly_compared(items)]
+
+
+def to_watch(
+    record: Record, stages: Sequence[Stage], thresholds: Array, weights: Array, history: tuple[float, ...] | None,
+    rest: float, skip: float = 0.0,
+) -> Item:
+    """An item for judging a known model, by which its start memory is found if too little is compared without one.
+
+    Nothing else is fitted to the record, unlike in `to_judge`. Raises IdentificationError if too few samples can be
+    compared.
+    """
+    course, _ = prepared.without_rails(prepared.course_of(record, history, prepared.samples_in(record, skip)))
+    if not enough([course]):
+        raise IdentificationError(too_little([course], JUDGE))
+    reach = math.inf if stages else float(thresholds[-1])
+    begun = start.unknown(course, reach) if history is None else course
+    if start.lacking(begun, acceptance.FEW_COMPARED):
+        (begun,) = start.of_model([course], stages, thresholds, weights, acceptance.FEW_COMPARED, reach)
+    return _item(begun, record, rest)
 
 
 def _tell_left_out(course: Course, record: Record, notes: list[str], repaired: list[Finding]) -> None:

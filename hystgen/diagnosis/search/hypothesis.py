@@ -475,7 +475,7 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
     """The nominal model with free weights, front and effect parameters, and the start of a search."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
-    parts = tuple(Part(effect.name, _near(effect), firm=True) for effect in given)
+    parts = tuple(Part(effect.name, near(effect), firm=True) for effect in given)
     return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
 
 
@@ -494,7 +494,7 @@ def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
     return p
 
 
-def _near(effect: Effect) -> Candidate:
+def near(effect: Effect) -> Candidate:
     """The effect with a free factor on each of its parameters, which preserves zeros and signs."""
     sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
     free = {key: size for key, size in sizes.items() if size}

@@ -1,0 +1,187 @@
+"""Since when sessions differ from earlier ones: a test of change whose false-alarm rate is calibrated, not tuned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.parameters.schema import Residual
+from hystgen.service.sessions import DIRECTIONS, Session
+
+Array = NDArray[np.float64]
+
+SEED = 0
+"""Seed of the draws that calibrate the test, so that the same records give the same result."""
+
+RESOLUTION = 20
+"""Draws beyond the threshold that a healthy set leaves on average; the stated rate is then known to a fifth of itself
+(1 sd)."""
+
+CHUNK = 2**22
+"""[numbers] Draws at a time, which bounds memory at 32 MB."""
+
+FEWEST = 3
+"""[sessions] Fewest that can show a change among themselves: two means and one scatter."""
+
+MISFIT_TURNS = 4.0
+"""[fractions of the drive range] A model's misfit changes by its own size over a quarter of the range: if the sessions
+after a change use other drives than those before, that much of the misfit may look like a change."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A possible change along one direction.
+
+    `first`: index of the first changed session; `size`: the change (relative; in s for a lag); `worth`: its rms effect
+    on the motion, output units; `sure`: standard deviation of `size`; `p_value`: probability of one so clear in a healthy set,
+    over all directions and sessions; `against`: `earlier sessions` or `identification`; `refused`: why it is no
+    evidence, although it is clear; empty if it is.
+    """
+
+    direction: str
+    first: int
+    size: float
+    worth: float
+    sure: float
+    p_value: float
+    against: str
+    refused: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of `size`, for normal scatter."""
+        return self.size - 1.96 * self.sure, self.size + 1.96 * self.sure
+
+    def sentence(self) -> str:
+        """The change in words."""
+        low, high = self.interval
+        return f"{DIRECTIONS[self.direction]} changed by {amount(self.direction, self.size)} (95 %: " \
+            f"{amount(self.direction, low)} to {amount(self.direction, high)})"
+
+
+def amount(direction: str, size: float) -> str:
+    """A change along a direction: in s for a lag, else relative."""
+    return f"{1e3 * size:+.3g} ms" if direction == "rate" else f"{100.0 * size:+.3g} %"
+
+
+def largest_residual(stated: Residual | None, false_alarms: float) -> float | None:
+    """The largest rms residual that identification may have left: the end of the interval of its estimate from a finite
+    number of independent samples, one-sided with error probability `false_alarms`."""
+    from scipy.stats import chi2
+
+    if stated is None:
+        return None
+    return float(stated.rms * math.sqrt(stated.samples / chi2.ppf(false_alarms, stated.samples)))
+
+
+def find(sessions: Sequence[Session], residual: float | None, false_alarms: float) -> list[Change]:
+    """Possible changes, at most one per direction and comparison: those that are evidence at this rate first, in the
+    order of their effect on the motion, then the others, the clearest first.
+
+    Every direction is tested twice: among the sessions, and against `residual`, the rms residual that identification
+    left (output units), if that is known. The smallest p-value counts, times the number of tests (Bonferroni).
+    """
+    names = [name for name in DIRECTIONS if all(name in each.seen for each in sessions)]
+    made = [] if len(sessions) < FEWEST else [
+        found for name in names if (found := _among(sessions, name, residual, false_alarms / len(names))) is not None
+    ]
+    if residual is not None:
+        made += [_beyond(sessions, name, residual, false_alarms / len(names)) for name in names]
+    tests = len(made)
+    final = [replace(each, p_value=min(1.0, tests * each.p_value)) for each in made]
+
+    def place(each: Change) -> tuple[bool, bool, float]:
+        shown = each.p_value <= false_alarms
+        return bool(each.refused), not shown, -each.worth if shown else each.p_value
+
+    return sorted(final, key=place)
+
+
+def _columns(sessions: Sequence[Session], name: str) -> tuple[Array, Array, Array]:
+    """Sizes, parts and standard deviations of a direction over the sessions (K,)."""
+    table = np.array([[s.seen[name].size, s.seen[name].part, s.seen[name].sure] for s in sessions])
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _between(size: Array, part: Array, sure: Array) -> float:
+    """Variance of the parts between sessions beyond that within (DerSimonian and Laird, Controlled Clin. Trials 1986,
+    for a regression through zero)."""
+    w = 1.0 / np.maximum(sure, 1e-300) ** 2
+    slope = float(w * size @ part) / float(w * size @ size)
+    excess = float(w @ (part - slope * size) ** 2) - (len(part) - 1)
+    return max(0.0, excess / float(np.sum(w) - (w**2 * size @ size) / (w * size @ size)))
+
+
+def _among(sessions: Sequence[Session], name: str, residual: float | None, rate: float) -> Change | None:
+    """The clearest change of a direction from one session to the next.
+
+    The parts are a regression on the sizes whose slope changes once; their scatter is that between the sessions. The
+    statistic is the largest |t| over all sessions at which it may change, and its distribution in a healthy set is
+    drawn, exact for normal scatter since |t| does not depend on its size (Barnard 1963; Dufour 2006).
+    """
+    size, part, sure = _columns(sessions, name)
+    number = len(part)
+    root = 1.0 / np.sqrt(_between(size, part, sure) + sure**2 + 1e-300)
+    line = size * root
+    line /= np.linalg.norm(line)
+    steps = np.tril(np.ones((number, number)))[:, 1:] * (size * root)[:, None]
+    steps -= np.outer(line, line @ steps)
+    lengths = np.linalg.norm(steps, axis=0)
+    unit = steps / np.maximum(lengths, 1e-300)
+
+    def squares(x: Array) -> Array:
+        """(draws, K - 1) squares of t for each session at which the slope may change."""
+        along = (x @ unit) ** 2
+        left = np.sum(x**2, axis=1) - (x @ line) ** 2
+        rest = np.maximum(left[:, None] - along, 1e-12 * left[:, None] + 1e-300)
+        return np.asarray(along / rest * (number - 2))
+
+    own = squares((part * root)[None, :])[0]
+    k = int(np.argmax(own))
+    draws = math.ceil(RESOLUTION / rate)
+    random, beyond, left = np.random.default_rng(SEED), 0, draws
+    while left:
+        now = min(left, CHUNK // number)
+        beyond += int(np.count_nonzero(np.max(squares(random.standard_normal((now, number))), axis=1) >= own[k]))
+        left -= now
+    change = float((part * root) @ unit[:, k]) / max(float(lengths[k]), 1e-300)
+    spread = abs(change) / math.sqrt(float(own[k])) if own[k] > 0.0 else math.inf
+    worth = abs(change) * float(np.sqrt(np.mean(size[k + 1 :] ** 2)))
+    misfit = residual if residual is not None else float(np.sqrt(np.mean([s.rms**2 for s in sessions[: k + 1]])))
+    other = min(1.0, MISFIT_TURNS * _gap(sessions[: k + 1], sessions[k + 1 :])) * misfit
+    refused = "" if worth > other else (
+        f"the drives from {sessions[k + 1].name} on differ from those before, which may explain it"
+    )
+    p = (1 + beyond) / (1 + draws)
+    return Change(name, k + 1, change, worth, spread, p, "earlier sessions", refused)
+
+
+def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
+    """How far apart two groups are in the use of the drive: 0 if they overlap, 1 for a whole drive range or a factor
+    of e in speed."""
+    one, other = np.array([s.use for s in before]), np.array([s.use for s in after])
+    reach = max(float(max(one[:, 1].max(), other[:, 1].max()) - min(one[:, 0].min(), other[:, 0].min())), 1e-300)
+    scale = np.array([reach, reach, 1.0])
+    apart = np.maximum(other.min(axis=0) - one.max(axis=0), one.min(axis=0) - other.max(axis=0))
+    return float(np.max(np.maximum(apart, 0.0) / scale))
+
+
+def _beyond(sessions: Sequence[Session], name: str, residual: float, rate: float) -> Change:
+    """The clearest session whose part along a direction exceeds the whole residual of identification.
+
+    A healthy unit's model misses no more in service than it did on the records it was fitted to, so a part is evidence
+    as far as it exceeds that residual by more than its own standard deviations.
+    """
+    from scipy.special import ndtr
+
+    size, part, sure = _columns(sessions, name)
+    p = 2.0 * ndtr(-np.maximum(np.abs(part) - residual, 0.0) / np.maximum(sure, 1e-300))
+    best = min(1.0, len(part) * float(np.min(p)))
+    k = int(np.argmax(len(part) * p <= max(best, rate)))
+    change = float(size[k:] @ part[k:]) / float(size[k:] @ size[k:])
+    worth = abs(change) * float(np.sqrt(np.mean(size[k:] ** 2)))
+    return Change(name, k, change, worth, float(np.max(sure[k:] / size[k:])), best, "identification")
