@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.parameters.schema import Residual
-from hystgen.service.sessions import DIRECTIONS, Session
+from hystgen.service.sessions import DIRECTIONS, SHAPE, Session
 
 Array = NDArray[np.float64]
 
@@ -37,9 +37,9 @@ class Change:
     """A possible change along one direction.
 
     `first`: index of the first changed session; `size`: the change (relative; in s for a lag); `worth`: its rms effect
-    on the motion, output units; `sure`: standard deviation of `size`; `p_value`: probability of one so clear in a healthy set,
-    over all directions and sessions; `against`: `earlier sessions` or `identification`; `refused`: why it is no
-    evidence, although it is clear; empty if it is.
+    on the motion, output units; `sure`: standard deviation of `size`; `p_value`: probability of one so clear in a
+    healthy set, over all directions and sessions; `against`: `earlier sessions` or `identification`; `refused`: why it
+    is no evidence, although it is clear; empty if it is.
     """
 
     direction: str
@@ -59,12 +59,16 @@ class Change:
     def sentence(self) -> str:
         """The change in words."""
         low, high = self.interval
+        if self.direction == SHAPE:
+            return f"its deviation in {DIRECTIONS[SHAPE]} grew {amount(SHAPE, self.size)}"
         return f"{DIRECTIONS[self.direction]} changed by {amount(self.direction, self.size)} (95 %: " \
             f"{amount(self.direction, low)} to {amount(self.direction, high)})"
 
 
 def amount(direction: str, size: float) -> str:
     """A change along a direction: in s for a lag, else relative."""
+    if direction == SHAPE:
+        return f"{math.exp(min(size, 99.0)):.3g} times"
     return f"{1e3 * size:+.3g} ms" if direction == "rate" else f"{100.0 * size:+.3g} %"
 
 
@@ -96,7 +100,9 @@ def find(sessions: Sequence[Session], residual: float | None, false_alarms: floa
 
     def place(each: Change) -> tuple[bool, bool, float]:
         shown = each.p_value <= false_alarms
-        return bool(each.refused), not shown, -each.worth if shown else each.p_value
+        # another direction is named if it makes up most of the power
+        worth = math.sqrt(0.5) * each.worth if each.direction == SHAPE else each.worth
+        return bool(each.refused), not shown, -worth if shown else each.p_value
 
     return sorted(final, key=place)
 
@@ -151,13 +157,26 @@ def _among(sessions: Sequence[Session], name: str, residual: float | None, rate:
     change = float((part * root) @ unit[:, k]) / max(float(lengths[k]), 1e-300)
     spread = abs(change) / math.sqrt(float(own[k])) if own[k] > 0.0 else math.inf
     worth = abs(change) * float(np.sqrt(np.mean(size[k + 1 :] ** 2)))
+    if name == SHAPE:
+        worth = math.exp(float(np.mean(part[k + 1 :]))) if change > 0.0 else 0.0
     misfit = residual if residual is not None else float(np.sqrt(np.mean([s.rms**2 for s in sessions[: k + 1]])))
     other = min(1.0, MISFIT_TURNS * _gap(sessions[: k + 1], sessions[k + 1 :])) * misfit
     refused = "" if worth > other else (
         f"the drives from {sessions[k + 1].name} on differ from those before, which may explain it"
     )
+    if name == SHAPE and (change < 0.0 or not _follows_motion(sessions[k + 1 :], rate)):
+        beyond, refused = draws, ""  # a smaller deviation, or more noise, is no change of the unit
     p = (1 + beyond) / (1 + draws)
     return Change(name, k + 1, change, worth, spread, p, "earlier sessions", refused)
+
+
+def _follows_motion(sessions: Sequence[Session], rate: float) -> bool:
+    """Whether the deviation of sessions follows the motion, rather than being noise, with error probability `rate`."""
+    from scipy.stats import chi2
+
+    found = [each.explained for each in sessions]
+    squares = sum((part / max(spread, 1e-300)) ** 2 for part, _, spread in found)
+    return bool(squares > chi2.ppf(1.0 - rate, sum(number for _, number, _ in found)))
 
 
 def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
@@ -178,10 +197,17 @@ def _beyond(sessions: Sequence[Session], name: str, residual: float, rate: float
     """
     from scipy.special import ndtr
 
-    size, part, sure = _columns(sessions, name)
+    if name == SHAPE:
+        whole = np.array([each.explained for each in sessions])
+        size, part, sure = np.ones(len(whole)), whole[:, 0], whole[:, 2]
+        part = np.sqrt(np.maximum(part**2 - whole[:, 1] * sure**2, 0.0))
+    else:
+        size, part, sure = _columns(sessions, name)
     p = 2.0 * ndtr(-np.maximum(np.abs(part) - residual, 0.0) / np.maximum(sure, 1e-300))
     best = min(1.0, len(part) * float(np.min(p)))
     k = int(np.argmax(len(part) * p <= max(best, rate)))
     change = float(size[k:] @ part[k:]) / float(size[k:] @ size[k:])
     worth = abs(change) * float(np.sqrt(np.mean(size[k:] ** 2)))
+    if name == SHAPE:
+        change, sure = math.log(max(change, 1e-300) / residual), sure / np.maximum(part, 1e-300)
     return Change(name, k, change, worth, float(np.max(sure[k:] / size[k:])), best, "identification")

@@ -6,11 +6,11 @@ from __future__ import annotations
 import json
 import math
 import os
-from statistics import NormalDist
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hystgen.basics import arguments, display, drawing, parallel
 from hystgen.basics.problems import RecordError, counted
-from hystgen.diagnosis import run
 from hystgen.diagnosis.findings.result import plain
+from hystgen.diagnosis.run import diagnose
 from hystgen.diagnosis.search import selection
 from hystgen.effects.base import Effect
 from hystgen.identification.fit import visited
@@ -59,9 +59,9 @@ class _Entry(BaseModel):
 class ChangeEntry(_Entry):
     """A possible change of the unit along one direction."""
 
-    direction: Literal["gain", "loop", "curve", "rate", "slow"]
+    direction: Literal["gain", "loop", "curve", "rate", "slow", "shape"]
     since: str = Field(description="first session that shows it")
-    size: float = Field(description="relative, in s for rate; against identification, distance from the model")
+    size: float = Field(description="relative; in s for rate; for shape the logarithm of a factor")
     interval: tuple[float, float] = Field(description="95 % interval of size")
     p_value: float = Field(description="chance of one so clear in a healthy set, over all directions and sessions")
     against: Literal["earlier sessions", "identification"]
@@ -76,7 +76,7 @@ class SessionEntry(_Entry):
     rms: float = Field(description="rms of measured minus expected, without offset and drift, output units")
     structured: float = Field(description="rms of the part of it that follows the motion, output units")
     gain: float | None = Field(description="relative distance of the motion's size from the model's")
-    tracking: float | None = Field(description="rms of measured minus reference about its mean; null without a column u")
+    tracking: float | None = Field(description="rms of measured minus reference about its mean; null if unknown")
 
 
 class EffectEntry(_Entry):
@@ -396,7 +396,7 @@ def _cause(
     def diagnosed(model: Model, group: Sequence[Session]) -> Diagnosis | None:
         try:
             records: list[Record] = [each.record for each in group]
-            return run.diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)
+            return diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)
         except (IdentificationError, RecordError):
             return None
 
