@@ -266,9 +266,11 @@ def healthy(seed: int, number: int | None = None) -> dict[str, object]:
     found = hystgen.monitor(model, sessions, causes=False)
     alone = replace(found, changes=tuple(change.find(found.sessions, None, found.false_alarms)))
     first = replace(found, changes=tuple(change.find(found.sessions[:1], found.residual, found.false_alarms)))
+    bound = found.residual or np.nan
     return {
         "seed": seed, "sessions": number, "p": found.p_value, "p_without_residual": alone.p_value,
-        "p_first_session": first.p_value,
+        "p_first_session": first.p_value, "missed": max(each.structured for each in found.sessions) / bound,
+        "missed_at_the_median": float(np.median([each.structured for each in found.sessions])) / bound,
     }
 
 

@@ -104,11 +104,19 @@ def test_the_false_alarm_rate_is_the_stated_one(number: int) -> None:
 
 
 def test_a_session_alone_is_judged_by_the_residual_of_identification() -> None:
-    """A part is evidence as far as it exceeds that residual: p is the normal tail of the excess."""
-    (found,) = change.find(made(np.array([0.5]), sure=0.1), 0.2, 0.01)
-    assert found.p_value == pytest.approx(2.0 * float(scipy.stats.norm.sf(3.0)))
-    (within,) = change.find(made(np.array([0.19]), sure=0.01), 0.2, 0.01)
+    """A part is evidence as far as it exceeds twice that residual: p is the normal tail of the excess; of several
+    sessions, half have to show it."""
+    tail = 2.0 * float(scipy.stats.norm.sf(3.0))
+    (found,) = change.find(made(np.array([0.5]), sure=0.1), 0.1, 0.01)
+    assert found.p_value == pytest.approx(tail)
+    (within,) = change.find(made(np.array([0.19]), sure=0.01), 0.1, 0.01)
     assert within.p_value == 1.0
+    lasting = change.find(made(np.array([0.0, 0.5, 0.5, 0.5]), sure=0.05), 0.1, 0.01)
+    (found,) = (each for each in lasting if each.against == "identification")
+    assert found.first == 1
+    odd = change.find(made(np.array([0.0, 9.0, 0.0, 0.0]), sure=0.1), 0.1, 0.01)
+    (found,) = (each for each in odd if each.against == "identification")
+    assert found.p_value == 1.0
 
 
 def test_the_bound_of_a_residual_covers_its_truth() -> None:

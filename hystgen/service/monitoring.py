@@ -52,11 +52,11 @@ REFITTED = 0.8
 power that then goes is far more than free weights take from noise."""
 
 
-class _Entry(BaseModel):
+class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class ChangeEntry(_Entry):
+class ChangeEntry(_Frozen):
     """A possible change of the unit along one direction."""
 
     direction: Literal["gain", "loop", "curve", "rate", "slow", "shape"]
@@ -68,7 +68,7 @@ class ChangeEntry(_Entry):
     refused: str = Field(description="why it is no evidence; empty if it is")
 
 
-class SessionEntry(_Entry):
+class SessionEntry(_Frozen):
     """A session as it was compared."""
 
     name: str
@@ -79,7 +79,7 @@ class SessionEntry(_Entry):
     tracking: float | None = Field(description="rms of measured minus reference about its mean; null if unknown")
 
 
-class EffectEntry(_Entry):
+class EffectEntry(_Frozen):
     """An effect that the diagnosis names in the sessions after the change, and not in those before."""
 
     name: str
@@ -88,7 +88,7 @@ class EffectEntry(_Entry):
     p_value: float
 
 
-class Report(_Entry):
+class MonitorReport(_Frozen):
     """The content of `monitor.json`."""
 
     hystgen: Literal[1] = 1
@@ -114,7 +114,7 @@ class Report(_Entry):
 
 def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of `monitor.json`."""
-    made = Report.model_json_schema(mode="serialization")
+    made = MonitorReport.model_json_schema(mode="serialization")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID, **made}
 
 
@@ -262,9 +262,9 @@ class Monitoring:
             found.append(f"record the reference as column {sessions.REFERENCE}, for the tracking error")
         return tuple(found)
 
-    def report(self) -> Report:
+    def report(self) -> MonitorReport:
         """The content of `monitor.json`."""
-        return Report(
+        return MonitorReport(
             verdict=self.verdict, alarm=self.alarm, since=self.since, p_value=self.p_value,
             false_alarms=self.false_alarms, unit=self.model.parameters.units.output, rms_now=self.rms_now,
             rms_then=self.rms_then, tracking_now=self.tracking_now, tracking_then=self.tracking_then,

@@ -46,7 +46,7 @@ weights that they do not show would otherwise be most of what it changes."""
 
 
 @dataclass(frozen=True)
-class Moved:
+class RefinedNumber:
     """A parameter: its old and new value and the 95 % interval of the new one; `shown`: whether the sessions say more
     about it than that it is roughly as before."""
 
@@ -68,7 +68,7 @@ class Refined:
     in output units, with the old and with the new model."""
 
     parameters: Parameters
-    numbers: tuple[Moved, ...]
+    numbers: tuple[RefinedNumber, ...]
     before: float
     after: float
     remarks: tuple[str, ...] = ()
@@ -255,27 +255,27 @@ def _better(one: _Fit, other: _Fit, more: int) -> bool:
     return more > 0 and bool(chi2.sf((other.squares - one.squares) / one.noise**2, more) < SURE)
 
 
-def _common(old: Array, found: _Fit, plays: int) -> Moved:
+def _common(old: Array, found: _Fit, plays: int) -> RefinedNumber:
     """The common factor of all weights, as a number of its own."""
     k = int(np.argmax(old[:plays]))
     factor, sure = float(found.values[k] / old[k]), float(found.sure[k] / old[k])
-    return Moved("gain (all weights)", 1.0, factor, (factor - 1.96 * sure, factor + 1.96 * sure), True)
+    return RefinedNumber("gain (all weights)", 1.0, factor, (factor - 1.96 * sure, factor + 1.96 * sure), True)
 
 
-def _singly(problem: _Problem, found: _Fit, shown: Bools, able: Bools) -> list[Moved]:
+def _singly(problem: _Problem, found: _Fit, shown: Bools, able: Bools) -> list[RefinedNumber]:
     numbers = []
     for k in range(problem.plays):
         if able[k]:
             value, sure = float(found.values[k]), float(found.sure[k])
             ends = max(value - 1.96 * sure, 0.0), value + 1.96 * sure
             name = f"weight at r = {problem.structure.thresholds[k]:.4g}"
-            numbers.append(Moved(name, float(problem.old[k]), value, ends, bool(shown[k])))
+            numbers.append(RefinedNumber(name, float(problem.old[k]), value, ends, bool(shown[k])))
     at = problem.plays
     for part in problem.structure.parts:
         for j in range(len(part.candidate.start)):
             value, sure = float(found.values[at]), float(found.sure[at])
             ends = math.exp(value - 1.96 * sure), math.exp(value + 1.96 * sure)
-            numbers.append(Moved(f"{part.name}, factor {j + 1}", 1.0, math.exp(value), ends, bool(shown[at])))
+            numbers.append(RefinedNumber(f"{part.name}, factor {j + 1}", 1.0, math.exp(value), ends, bool(shown[at])))
             at += 1
     return numbers
 
