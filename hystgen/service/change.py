@@ -88,8 +88,8 @@ def largest_residual(stated: Residual | None, false_alarms: float) -> float | No
 
 
 def find(sessions: Sequence[Session], residual: float | None, false_alarms: float) -> list[Change]:
-    """Possible changes, at most one per direction and comparison: those that are evidence at this rate first, in the
-    order of their effect on the motion, then the others, the clearest first.
+    """Possible changes, at most one per direction and comparison: those that are evidence at this rate first, the
+    directions in the order of their effect on the motion and each with its earliest session first, then the others.
 
     Every direction is tested twice: among the sessions, and against `residual`, the rms residual that identification
     left (output units), if that is known. The smallest p-value counts, times the number of tests (Bonferroni).
@@ -103,11 +103,18 @@ def find(sessions: Sequence[Session], residual: float | None, false_alarms: floa
     tests = len(made)
     final = [replace(each, p_value=min(1.0, tests * each.p_value)) for each in made]
 
-    def place(each: Change) -> tuple[bool, bool, float]:
-        shown = each.p_value <= false_alarms
-        # another direction is named if it makes up most of the power
+    def shown(each: Change) -> bool:
+        return not each.refused and each.p_value <= false_alarms
+
+    effect = dict.fromkeys(names, 0.0)
+    for each in filter(shown, final):  # a direction other than the shape is named if it makes up most of the power
         worth = math.sqrt(0.5) * each.worth if each.direction == SHAPE else each.worth
-        return bool(each.refused), not shown, -worth if shown else each.p_value
+        effect[each.direction] = max(effect[each.direction], worth)
+
+    def place(each: Change) -> tuple[float, ...]:
+        if shown(each):
+            return 0.0, -effect[each.direction], each.first
+        return 1.0 + bool(each.refused), each.p_value, each.first
 
     return sorted(final, key=place)
 
