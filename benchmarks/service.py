@@ -7,7 +7,8 @@ inverse of that model. Sessions differ in reference, amplitude, length, noise an
 coloured and drifts. Half the units repeat one or two references, half never do.
 
     python -m benchmarks.service healthy --seeds 0:300 -o build/service/healthy.csv
-    python -m benchmarks.service changes --seeds 1000:1020 -o docs/service.csv
+    python -m benchmarks.service changes --seeds 1000:1012 -o docs/service.csv
+    python -m benchmarks.service figure --source docs/service.csv -o docs/service.svg
 """
 
 from __future__ import annotations
@@ -289,13 +290,47 @@ def changes(seed: int) -> Iterator[dict[str, object]]:
                 }
 
 
+def figure(source: Path, target: Path) -> None:
+    """Draw the share of units that raise an alarm over the size of the change, from the file that `changes` writes."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    mpl.rcParams.update({"svg.hashsalt": "hystgen", "svg.fonttype": "none", "font.size": 10})
+    with source.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    drawn = Figure(figsize=(9.0, 4.6), layout="constrained")
+    panels = drawn.subplots(2, 3, sharex=True, sharey=True)
+    for axes, what in zip(panels.flat, CHANGES, strict=True):
+        for after, marker in zip(COUNTS, "osD", strict=True):
+            shares = []
+            for size in SIZES:
+                chosen = [r for r in rows if (r["change"], float(r["size"]), int(r["after"])) == (what, size, after)]
+                shares.append(100.0 * float(np.mean([int(r["alarm"]) for r in chosen])))
+            axes.plot([100.0 * size for size in SIZES], shares, marker=marker, label=f"{after} after the change")
+        axes.set_title(what, loc="left")
+        axes.set_xscale("log")
+        axes.set_xticks([1, 2, 5, 10], ["1", "2", "5", "10"])
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
+    for axes in panels[1]:
+        axes.set_xlabel("size of the change (%)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("alarms (%)")
+    panels[0, 0].legend(frameon=False, fontsize=8)
+    drawn.savefig(target, metadata={"Date": None})
+
+
 def main() -> None:
     """Run one of the measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["healthy", "changes"])
+    parser.add_argument("what", choices=["healthy", "changes", "figure"])
     parser.add_argument("--seeds", default="0:300")
+    parser.add_argument("--source", type=Path, help="for the figure: what changes wrote")
     parser.add_argument("-o", type=Path, required=True)
     given = parser.parse_args()
+    if given.what == "figure":
+        figure(given.source, given.o)
+        return
     first, last = map(int, given.seeds.split(":"))
     given.o.parent.mkdir(parents=True, exist_ok=True)
     with given.o.open("w", newline="") as out:
