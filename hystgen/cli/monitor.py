@@ -39,7 +39,8 @@ def _probability(_context: click.Context, _option: click.Parameter, value: float
 @common.quiet_option
 def monitor(
     params: str, data: tuple[str, ...], false_alarms: float, output: str | None, json_file: str | None,
-    refine: str | None, no_causes: bool, effects: tuple[str, ...], history: str | None, rest: float, skip: float, quiet: bool,
+    refine: str | None, no_causes: bool, effects: tuple[str, ...], history: str | None, rest: float, skip: float,
+    quiet: bool,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Has the unit moved away from its model, since when, by what, and does it matter?
@@ -71,7 +72,8 @@ def monitor(
     found = common.guarded(
         params,
         lambda: report.monitor(
-            model, data, false_alarms=false_alarms, causes=not no_causes, history=visited, rest=rest, skip=skip, effects=own, **how
+            model, data, false_alarms=false_alarms, causes=not no_causes, history=visited, rest=rest, skip=skip,
+            effects=own, **how,
         ),
     )
     for note in found.notes:

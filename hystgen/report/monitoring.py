@@ -51,13 +51,13 @@ def figure(found: Monitoring, width: float = WIDE) -> Figure:
     """Over the sessions: the clearest direction with its band, and the rms errors; below, the deviation over the drive
     before and after the change."""
     drawn = drawing.figure(width, 7.5 if width == WIDE else 10.0)
-    below = ["before", "now"] if found.first else ["now"]
-    places = [["off"] * len(below), ["errors"] * len(below), below]
+    below = "bn" if found.first else "n"
+    places = ";".join(["o" * len(below), "e" * len(below), below])
     axes = drawn.subplot_mosaic(places, height_ratios=(1.0, 1.0, 1.2))
-    axes["errors"].sharex(axes["off"])
-    axes["off"].tick_params(labelbottom=False)
-    _over_sessions(axes["off"], found)
-    _errors(axes["errors"], found)
+    axes["e"].sharex(axes["o"])
+    axes["o"].tick_params(labelbottom=False)
+    _over_sessions(axes["o"], found)
+    _errors(axes["e"], found)
     _deviations([axes[name] for name in below], found)
     return drawn
 

@@ -131,7 +131,8 @@ def _between(size: Array, part: Array, sure: Array) -> float:
     w = 1.0 / np.maximum(sure, 1e-300) ** 2
     slope = float(w * size @ part) / float(w * size @ size)
     excess = float(w @ (part - slope * size) ** 2) - (len(part) - 1)
-    return max(0.0, excess / float(np.sum(w) - (w**2 * size @ size) / (w * size @ size)))
+    weight = float(np.sum(w) - (w**2 * size @ size) / (w * size @ size))
+    return max(0.0, excess / weight) if weight > 0.0 else 0.0  # 0 if one session outweighs all others
 
 
 def _among(sessions: Sequence[Session], name: str, residual: float | None, rate: float) -> Change | None:

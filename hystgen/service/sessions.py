@@ -59,6 +59,10 @@ are taken out of the residual."""
 MOST_COSINES = 12
 """Number of these cosines at most, which bounds the time for long sessions."""
 
+FEWEST_SAMPLES = 100
+"""Fewest compared samples of a session: about four for each signal and cosine that its residual is split into, so that
+what is left of it shows the noise and its correlation."""
+
 COLLINEAR = 1e-3
 """[fraction of its size] A direction of which drift and offset leave less than this is not seen in a session."""
 
@@ -172,7 +176,8 @@ class Session:
         table = self._signals
         solution, _, number, _ = np.linalg.lstsq(table, self.residual, rcond=COLLINEAR)
         rest = self.residual - table @ solution
-        spread = _rms(rest) * math.sqrt(correlation_time(rest) / len(rest))
+        free = max(len(rest) - int(number) - self._drift.shape[1], 1)
+        spread = math.sqrt(float(rest @ rest) * correlation_time(rest) / (free * len(rest)))
         return _rms(table @ solution), int(number), spread
 
     @cached_property
@@ -262,7 +267,12 @@ def compared(
             notes.append(f"{record.name} is left out: an effect of the model gives no finite output")
             continue
         session = Session(record.name, record, item, error)
-        if session.seen:
+        if len(session.known) < FEWEST_SAMPLES:
+            notes.append(
+                f"{record.name} is left out: only {len(session.known)} samples can be compared, since its start memory "
+                f"is unknown, and at least {FEWEST_SAMPLES} are needed; give --history"
+            )
+        elif session.seen:
             found.append(session)
         else:
             notes.append(f"{record.name} is left out: its drive hardly moves")
