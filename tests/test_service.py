@@ -180,6 +180,8 @@ def test_one_session_is_compared_with_identification() -> None:
     found = hystgen.monitor(model(), session(1, gain=0.93), causes=False)
     assert found.since == "s01.csv"
     assert found.rms_then == found.residual
+    with pytest.raises(RecordError, match=r"s01.csv is left out: only \d+ samples can be compared.*--history"):
+        hystgen.monitor(model(), session(1).section(0, 99))
     with pytest.raises(RecordError, match=r"cannot show a change.*identify again"):
         hystgen.monitor(model(MODEL), session(1, gain=0.93))
 
