@@ -82,13 +82,13 @@ def monitor(
         console.say(found.sentence())
     for text in found.advice():
         console.note(f"to tell more: {text}")
+    refined = common.guarded(params, found.refine) if refine else None
     if json_file:
         common.guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
     if output:
         common.guarded(output, lambda: found.write(output))
     written = [*filter(None, [json_file]), *map(str, inside)]
-    if refine:
-        refined = common.guarded(params, found.refine)
+    if refine and refined is not None:
         console.say(refined.table())
         common.guarded(refine, partial(writing.write_atomically, refine, refined.text()))
         written.append(refine)
