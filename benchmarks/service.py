@@ -7,7 +7,8 @@ inverse of that model. Sessions differ in reference, amplitude, length, noise an
 coloured and drifts. Half the units repeat one or two references, half never do.
 
     python -m benchmarks.service healthy --seeds 0:300 -o build/service/healthy.csv
-    python -m benchmarks.service changes --seeds 1000:1020 -o docs/service.csv
+    python -m benchmarks.service changes --seeds 1000:1012 -o docs/service.csv
+    python -m benchmarks.service figure --source docs/service.csv -o docs/service.svg
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 
 import hystgen
 from hystgen.records import Record
+from hystgen.service import change
 
 Array = NDArray[np.float64]
 
@@ -59,7 +61,8 @@ class Relays:
         centre = rng.normal(rng.uniform(35.0, 65.0), rng.uniform(22.0, 45.0), 3000)
         half = rng.exponential(rng.uniform(8.0, 20.0), 3000)
         height = np.full(3000, rng.uniform(0.35, 0.55) * STROKE / 3000)
-        return cls(centre + half, centre - half, height, rng.uniform(0.5, 0.65) * STROKE / FULL, rng.uniform(0, 0.06))
+        slope = rng.uniform(0.5, 0.65) * STROKE / FULL
+        return cls(centre + half, centre - half, height, slope, rng.uniform(0.0, 0.06))
 
     def run(self, v: Array) -> Array:
         """The motion (N,), um."""
@@ -82,7 +85,7 @@ class Relays:
 
 @dataclass
 class BoucWen:
-    """Bouc and Wen's equation, `z' = v' (a - (b sign(v' z) + c) |z|^n)`, beside a straight line, taken from a straight line."""
+    """Bouc and Wen's equation, `z' = v' (a - (b sign(v' z) + c) |z|^n)`, whose z is taken from a straight line."""
 
     a: float
     b: float
@@ -144,7 +147,11 @@ def coloured(rng: np.random.Generator, number: int, size: float) -> Array:
     return np.asarray(size * (0.6 * parts[0] + 0.7 * parts[1] + 0.5 * (parts[2] - parts[2].mean())))
 
 
-def references(rng: np.random.Generator) -> Callable[[float], tuple[Array, float]]:
+Use = Callable[[float], tuple[Array, float]]
+"""The reference (um, if the unit reached all of `STROKE`) and the sample time (s) for an amplitude."""
+
+
+def references(rng: np.random.Generator) -> Use:
     """A use of the unit: for an amplitude (fraction of the stroke), the reference and the sample time."""
     kind = rng.integers(0, 4)
     number = int(rng.integers(700, 2200))
@@ -188,12 +195,13 @@ def changed(plant: Plant, change: str, size: float) -> Plant:
 
 
 def session(
-    rng: np.random.Generator, name: str, plant: Plant, model: hystgen.Model, use: Callable[[float], tuple[Array, float]],
-    amplitude: float, change: str, size: float, age: float,
+    rng: np.random.Generator, name: str, plant: Plant, model: hystgen.Model, use: Use, amplitude: float, change: str,
+    size: float, age: float,
 ) -> Record:
     """A recorded session; `age`: share of a creeping change that has happened."""
     u, step = use(amplitude)
-    ends = np.asarray(model.simulate(np.array([0.0, FULL, 0.0])))
+    low, high = model.cascade.input_range
+    ends = np.asarray(model.simulate(np.array([low, high, low])))
     u = ends[2] + (ends[1] - ends[2]) * u / STROKE  # what the unit reaches
     v = np.clip(np.asarray(model.inverse().simulate(u)), 0.0, FULL)
     before = np.interp(np.linspace(0.0, 3.0, 120), np.arange(4), [*rng.uniform(0.0, FULL, 3), v[0]])
@@ -225,7 +233,9 @@ def new(seed: int) -> tuple[Plant, hystgen.Model]:
             return plant, model
 
 
-def unit(seed: int, number: int, change: str = "none", size: float = 0.0, after: int = 0) -> tuple[hystgen.Model, list[Record]]:
+def unit(
+    seed: int, number: int, change: str = "none", size: float = 0.0, after: int = 0
+) -> tuple[hystgen.Model, list[Record]]:
     """A unit's model and its sessions, the last `after` of which are changed."""
     plant, model = new(seed)
     rng = np.random.default_rng([seed, 2])
@@ -249,47 +259,78 @@ def unit(seed: int, number: int, change: str = "none", size: float = 0.0, after:
     return model, made
 
 
-def healthy(seed: int) -> dict[str, object]:
-    """A healthy unit: the p-value of its sessions, with and without the residual of identification."""
-    number = int(np.random.default_rng([seed, 1]).integers(4, 13))
+def healthy(seed: int, number: int | None = None) -> dict[str, object]:
+    """A healthy unit: the p-value of its sessions, with and without the residual of identification, and of the first
+    session alone; `number` of sessions, by default 4 to 12."""
+    number = number or int(np.random.default_rng([seed, 1]).integers(4, 13))
     model, sessions = unit(seed, number)
     found = hystgen.monitor(model, sessions, causes=False)
-    bare = replace_residual(model)
-    alone = hystgen.monitor(bare, sessions, causes=False)
-    first = hystgen.monitor(model, sessions[:1], causes=False)
+    alone = replace(found, changes=tuple(change.find(found.sessions, None, found.false_alarms)))
+    first = replace(found, changes=tuple(change.find(found.sessions[:1], found.residual, found.false_alarms)))
+    bound = found.residual or np.nan
     return {
         "seed": seed, "sessions": number, "p": found.p_value, "p_without_residual": alone.p_value,
-        "p_first_session": first.p_value,
+        "p_first_session": first.p_value, "missed": max(each.structured for each in found.sessions) / bound,
+        "missed_at_the_median": float(np.median([each.structured for each in found.sessions])) / bound,
     }
-
-
-def replace_residual(model: hystgen.Model) -> hystgen.Model:
-    """The model without what identification said about its residual."""
-    return hystgen.Model(model.parameters.model_copy(update={"residual": None}))
 
 
 def changes(seed: int) -> Iterator[dict[str, object]]:
     """A unit with every change, size and number of sessions."""
-    for change in CHANGES:
+    for what in CHANGES:
         for size in SIZES:
-            model, sessions = unit(seed, BEFORE + max(COUNTS), change, size, max(COUNTS))
+            model, sessions = unit(seed, BEFORE + max(COUNTS), what, size, max(COUNTS))
             for after in COUNTS:
                 kept = sessions[: BEFORE + after]
                 found = hystgen.monitor(model, kept, causes=False)
                 yield {
-                    "seed": seed, "change": change, "size": size, "after": after, "p": found.p_value,
+                    "seed": seed, "change": what, "size": size, "after": after, "p": found.p_value,
                     "alarm": int(found.alarm), "since": found.since or "",
                     "right": int(found.since == sessions[BEFORE].name),
                 }
 
 
+def figure(source: Path, target: Path) -> None:
+    """Draw the share of units that raise an alarm over the size of the change, from the file that `changes` writes."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    mpl.rcParams.update({"svg.hashsalt": "hystgen", "svg.fonttype": "none", "font.size": 10})
+    with source.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    drawn = Figure(figsize=(9.0, 4.6), layout="constrained")
+    panels = drawn.subplots(2, 3, sharex=True, sharey=True)
+    for axes, what in zip(panels.flat, CHANGES, strict=True):
+        for after, marker in zip(COUNTS, "osD", strict=True):
+            shares = []
+            for size in SIZES:
+                chosen = [r for r in rows if (r["change"], float(r["size"]), int(r["after"])) == (what, size, after)]
+                shares.append(100.0 * float(np.mean([int(r["alarm"]) for r in chosen])))
+            axes.plot([100.0 * size for size in SIZES], shares, marker=marker, label=f"{after} after the change")
+        axes.set_title(what, loc="left")
+        axes.set_xscale("log")
+        axes.set_xticks([1, 2, 5, 10], ["1", "2", "5", "10"])
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
+    for axes in panels[1]:
+        axes.set_xlabel("size of the change (%)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("alarms (%)")
+    panels[0, 0].legend(frameon=False, fontsize=8)
+    drawn.savefig(target, metadata={"Date": None})
+
+
 def main() -> None:
     """Run one of the measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["healthy", "changes"])
+    parser.add_argument("what", choices=["healthy", "changes", "figure"])
     parser.add_argument("--seeds", default="0:300")
+    parser.add_argument("--source", type=Path, help="for the figure: what changes wrote")
     parser.add_argument("-o", type=Path, required=True)
     given = parser.parse_args()
+    if given.what == "figure":
+        figure(given.source, given.o)
+        return
     first, last = map(int, given.seeds.split(":"))
     given.o.parent.mkdir(parents=True, exist_ok=True)
     with given.o.open("w", newline="") as out:

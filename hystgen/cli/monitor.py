@@ -32,13 +32,15 @@ def _probability(_context: click.Context, _option: click.Parameter, value: float
     "--refine", type=click.Path(dir_okay=False), metavar="NEW.yaml",
     help="write the parameters that the sessions show, as a new parameter file",
 )
+@click.option("--no-causes", is_flag=True, help="leave out the diagnosis of a change, which takes most of the time")
 @common.effects_option
 @common.record_options
 @common.skip_option
 @common.quiet_option
 def monitor(
     params: str, data: tuple[str, ...], false_alarms: float, output: str | None, json_file: str | None,
-    refine: str | None, effects: tuple[str, ...], history: str | None, rest: float, skip: float, quiet: bool,
+    refine: str | None, no_causes: bool, effects: tuple[str, ...], history: str | None, rest: float, skip: float,
+    quiet: bool,
     **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Has the unit moved away from its model, since when, by what, and does it matter?
@@ -70,7 +72,8 @@ def monitor(
     found = common.guarded(
         params,
         lambda: report.monitor(
-            model, data, false_alarms=false_alarms, history=visited, rest=rest, skip=skip, effects=own, **how
+            model, data, false_alarms=false_alarms, causes=not no_causes, history=visited, rest=rest, skip=skip,
+            effects=own, **how,
         ),
     )
     for note in found.notes:
@@ -79,13 +82,13 @@ def monitor(
         console.say(found.sentence())
     for text in found.advice():
         console.note(f"to tell more: {text}")
+    refined = common.guarded(params, found.refine) if refine else None
     if json_file:
         common.guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
     if output:
         common.guarded(output, lambda: found.write(output))
     written = [*filter(None, [json_file]), *map(str, inside)]
-    if refine:
-        refined = common.guarded(params, found.refine)
+    if refine and refined is not None:
         console.say(refined.table())
         common.guarded(refine, partial(writing.write_atomically, refine, refined.text()))
         written.append(refine)

@@ -1,4 +1,4 @@
-"""The picture and the page of a unit in service: its sessions, the change, the loops before and after, and the cause."""
+"""The picture and the page of a unit in service: its sessions, the change, loops before and after, and the cause."""
 
 from __future__ import annotations
 
@@ -51,11 +51,14 @@ def figure(found: Monitoring, width: float = WIDE) -> Figure:
     """Over the sessions: the clearest direction with its band, and the rms errors; below, the deviation over the drive
     before and after the change."""
     drawn = drawing.figure(width, 7.5 if width == WIDE else 10.0)
-    top, below = drawn.subfigures(2, 1, squeeze=False, height_ratios=(2.0, 1.2))[:, 0]
-    first, second = top.subplots(2, 1, sharex=True)
-    _over_sessions(first, found)
-    _errors(second, found)
-    _deviations(below.subplots(1, 2 if found.first else 1, sharex=True, sharey=True, squeeze=False)[0], found)
+    below = "bn" if found.first else "n"
+    places = ";".join(["o" * len(below), "e" * len(below), below])
+    axes = drawn.subplot_mosaic(places, height_ratios=(1.0, 1.0, 1.2))
+    axes["e"].sharex(axes["o"])
+    axes["o"].tick_params(labelbottom=False)
+    _over_sessions(axes["o"], found)
+    _errors(axes["e"], found)
+    _deviations([axes[name] for name in below], found)
     return drawn
 
 
@@ -115,6 +118,9 @@ def _deviations(panels: Sequence[Axes], found: Monitoring) -> None:
                   linewidth=0.8)
         axes.set_title(session.name, fontsize=9)
         axes.set_xlabel(label("drive", found.model.parameters.units.input))
+    most = max(float(np.max(np.abs(each.residual))) for each in shown)
+    for axes in panels:
+        axes.set_ylim(-1.05 * most, 1.05 * most)
     panels[0].set_ylabel(label("deviation", found.model.parameters.units.output))
 
 
@@ -125,9 +131,9 @@ def html(found: Monitoring) -> str:
     marked = "; the vertical line is the change" if found.alarm else ""
     picture = Picture(
         "sessions", wide, narrow,
-        "Above: how far the unit is from its model in every session, with 95 % intervals, and the band in which healthy "
-        f"sessions stay{marked}. Middle: rms of measured minus expected and of measured minus reference. Below: "
-        "deviation from the model over the drive, without offset and drift"
+        "Above: how far the unit is from its model in every session, with 95 % intervals, and the band in which "
+        f"healthy sessions stay{marked}. Middle: rms of measured minus expected and of measured minus reference. "
+        "Below: deviation from the model over the drive, without offset and drift"
         + (", before and since the change." if found.alarm else "."),
         "Sessions over time with the band of healthy ones, rms errors, and deviations over the drive.",
     )
@@ -147,7 +153,8 @@ def html(found: Monitoring) -> str:
 def _next_step(found: Monitoring) -> list[Text]:
     if not found.alarm:
         return []
-    return [Text("Your next step: bring the model up to date.", "hystgen monitor params.yaml RECORDS --refine new.yaml")]
+    command = "hystgen monitor params.yaml RECORDS --refine new.yaml"
+    return [Text("Your next step: bring the model up to date.", command)]
 
 
 def _no_cause(found: Monitoring) -> str:
@@ -190,7 +197,8 @@ def _changes(found: Monitoring) -> list[HtmlTable | Text]:
 
 def _table(found: Monitoring) -> HtmlTable:
     unit = found.model.parameters.units.output
-    rows = [["session", "samples", label("off the model, rms", unit), "of which structured", "gain", "off the reference"]]
+    off = label("off the model, rms", unit)
+    rows = [["session", "samples", off, "of which structured", "gain", "off the reference"]]
     for each in found.sessions:
         gain = "" if each.gain is None else f"{100.0 * each.gain:+.3g} %"
         rows.append([

@@ -6,11 +6,11 @@ from __future__ import annotations
 import json
 import math
 import os
-from statistics import NormalDist
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from hystgen.basics import arguments, display, drawing, parallel
 from hystgen.basics.problems import RecordError, counted
-from hystgen.diagnosis import run
 from hystgen.diagnosis.findings.result import plain
+from hystgen.diagnosis.run import diagnose
 from hystgen.diagnosis.search import selection
 from hystgen.effects.base import Effect
 from hystgen.identification.fit import visited
@@ -52,23 +52,23 @@ REFITTED = 0.8
 power that then goes is far more than free weights take from noise."""
 
 
-class _Entry(BaseModel):
+class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class ChangeEntry(_Entry):
+class ChangeEntry(_Frozen):
     """A possible change of the unit along one direction."""
 
-    direction: Literal["gain", "loop", "curve", "rate", "slow"]
+    direction: Literal["gain", "loop", "curve", "rate", "slow", "shape"]
     since: str = Field(description="first session that shows it")
-    size: float = Field(description="relative, in s for rate; against identification, distance from the model")
+    size: float = Field(description="relative; in s for rate; for shape the logarithm of a factor")
     interval: tuple[float, float] = Field(description="95 % interval of size")
     p_value: float = Field(description="chance of one so clear in a healthy set, over all directions and sessions")
     against: Literal["earlier sessions", "identification"]
     refused: str = Field(description="why it is no evidence; empty if it is")
 
 
-class SessionEntry(_Entry):
+class SessionEntry(_Frozen):
     """A session as it was compared."""
 
     name: str
@@ -76,10 +76,10 @@ class SessionEntry(_Entry):
     rms: float = Field(description="rms of measured minus expected, without offset and drift, output units")
     structured: float = Field(description="rms of the part of it that follows the motion, output units")
     gain: float | None = Field(description="relative distance of the motion's size from the model's")
-    tracking: float | None = Field(description="rms of measured minus reference about its mean; null without a column u")
+    tracking: float | None = Field(description="rms of measured minus reference about its mean; null if unknown")
 
 
-class EffectEntry(_Entry):
+class EffectEntry(_Frozen):
     """An effect that the diagnosis names in the sessions after the change, and not in those before."""
 
     name: str
@@ -88,7 +88,7 @@ class EffectEntry(_Entry):
     p_value: float
 
 
-class Report(_Entry):
+class MonitorReport(_Frozen):
     """The content of `monitor.json`."""
 
     hystgen: Literal[1] = 1
@@ -114,7 +114,7 @@ class Report(_Entry):
 
 def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of `monitor.json`."""
-    made = Report.model_json_schema(mode="serialization")
+    made = MonitorReport.model_json_schema(mode="serialization")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID, **made}
 
 
@@ -262,9 +262,9 @@ class Monitoring:
             found.append(f"record the reference as column {sessions.REFERENCE}, for the tracking error")
         return tuple(found)
 
-    def report(self) -> Report:
+    def report(self) -> MonitorReport:
         """The content of `monitor.json`."""
-        return Report(
+        return MonitorReport(
             verdict=self.verdict, alarm=self.alarm, since=self.since, p_value=self.p_value,
             false_alarms=self.false_alarms, unit=self.model.parameters.units.output, rms_now=self.rms_now,
             rms_then=self.rms_then, tracking_now=self.tracking_now, tracking_then=self.tracking_then,
@@ -396,7 +396,7 @@ def _cause(
     def diagnosed(model: Model, group: Sequence[Session]) -> Diagnosis | None:
         try:
             records: list[Record] = [each.record for each in group]
-            return run.diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)
+            return diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)
         except (IdentificationError, RecordError):
             return None
 

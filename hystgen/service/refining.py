@@ -46,7 +46,7 @@ weights that they do not show would otherwise be most of what it changes."""
 
 
 @dataclass(frozen=True)
-class Moved:
+class RefinedNumber:
     """A parameter: its old and new value and the 95 % interval of the new one; `shown`: whether the sessions say more
     about it than that it is roughly as before."""
 
@@ -68,7 +68,7 @@ class Refined:
     in output units, with the old and with the new model."""
 
     parameters: Parameters
-    numbers: tuple[Moved, ...]
+    numbers: tuple[RefinedNumber, ...]
     before: float
     after: float
     remarks: tuple[str, ...] = ()
@@ -85,8 +85,7 @@ class Refined:
         """What moved, in a sentence."""
         u = f" {self.parameters.units.output}".rstrip()
         moved = [each.name for each in self.numbers if each.moved]
-        what = f"{', '.join(moved)} moved" if moved else "No parameter moved beyond its interval"
-        return f"{what[0].upper()}{what[1:]}; the rms residual of the sessions goes from {self.before:.3g}{u} to " \
+        return f"Moved: {', '.join(moved)}. The rms residual of the sessions goes from {self.before:.3g}{u} to " \
             f"{self.after:.3g}{u}."
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -171,7 +170,9 @@ class _Problem:
         width = self.prior[free] if not common else np.array([PRIOR])
         low, high = self.structure.bounds
         low, high = np.concatenate([np.zeros(n), low]), np.concatenate([np.full(n, np.inf), high])
-        ends = (-np.ones(1), np.full(1, np.inf)) if common else (low[free] - self.old[free], high[free] - self.old[free])
+        ends = low[free] - self.old[free], high[free] - self.old[free]
+        if common:
+            ends = -np.ones(1), np.full(1, np.inf)
         for _ in range(STEPS):
             whole, noise = self.system(at), self.noise(at)
             table = np.concatenate([whole[:, :-1] @ directions / noise, np.diag(1.0 / width)])
@@ -194,7 +195,7 @@ def refine(model: Model, sessions: Sequence[Session]) -> Refined:
     Weights and parameters of effects are fitted about their old values, with these as a prior: a parameter is shown if
     the sessions say more about it than the prior does, with the correlation of the residual counted. One factor for all
     weights is preferred to every weight of its own. The offset stays, since every session has its own zero. Raises
-    IdentificationError if nothing is shown.
+    IdentificationError if nothing is shown, or nothing moved.
     """
     cascade = model.cascade
     structure = Structure(
@@ -220,7 +221,7 @@ def _refined(model: Model, problem: _Problem, sessions: Sequence[Session]) -> Re
     full = model.simulate(np.array([*model.cascade.input_range, model.cascade.input_range[0]]))
     wide = moves > MOST_OF * float(np.ptp(np.asarray(full)))
     if not wide and not shown.any():
-        raise IdentificationError(_refusal(model, sessions))
+        raise IdentificationError(_refusal(model, sessions, "show no parameter of the model"))
     each_fit = problem.solve(shown) if shown.any() else None
     factor = problem.solve(np.zeros(len(old), dtype=bool), common=True) if wide else None
     if factor is not None and (each_fit is None or not _better(each_fit, factor, int(np.count_nonzero(shown)) - 1)):
@@ -228,6 +229,9 @@ def _refined(model: Model, problem: _Problem, sessions: Sequence[Session]) -> Re
     else:
         assert each_fit is not None
         chosen, numbers = each_fit, _singly(problem, each_fit, shown, able)
+    if not any(each.moved for each in numbers):
+        what = "show no parameter that moved beyond its interval"
+        raise IdentificationError(f"these sessions {what}; keep the model" if wide else _refusal(model, sessions, what))
     parameters = _parameters(model, problem, chosen)
     before, after = (rms(problem.fitted(x).errors(problem.items)) for x in (old, chosen.values))
     if after > before:
@@ -235,13 +239,12 @@ def _refined(model: Model, problem: _Problem, sessions: Sequence[Session]) -> Re
     return Refined(parameters, tuple(numbers), before, after, tuple(_unshown(problem, shown, able, chosen is factor)))
 
 
-def _refusal(model: Model, sessions: Sequence[Session]) -> str:
+def _refusal(model: Model, sessions: Sequence[Session], what: str) -> str:
     low, high = model.cascade.input_range
     span = max(float(np.ptp(each.item.run.v[each.known])) for each in sessions)
     return (
-        f"these sessions show no parameter of the model: their drives move over {percent(span / (high - low))} of the "
-        "input range at most, and what they leave could come from any weight; record a session with moves over the "
-        "whole range"
+        f"these sessions {what}: their drives move over {percent(span / (high - low), of='the input range')} at most; "
+        "record a session with moves over the whole range"
     )
 
 
@@ -252,27 +255,27 @@ def _better(one: _Fit, other: _Fit, more: int) -> bool:
     return more > 0 and bool(chi2.sf((other.squares - one.squares) / one.noise**2, more) < SURE)
 
 
-def _common(old: Array, found: _Fit, plays: int) -> Moved:
+def _common(old: Array, found: _Fit, plays: int) -> RefinedNumber:
     """The common factor of all weights, as a number of its own."""
     k = int(np.argmax(old[:plays]))
     factor, sure = float(found.values[k] / old[k]), float(found.sure[k] / old[k])
-    return Moved("gain (all weights)", 1.0, factor, (factor - 1.96 * sure, factor + 1.96 * sure), True)
+    return RefinedNumber("gain (all weights)", 1.0, factor, (factor - 1.96 * sure, factor + 1.96 * sure), True)
 
 
-def _singly(problem: _Problem, found: _Fit, shown: Bools, able: Bools) -> list[Moved]:
+def _singly(problem: _Problem, found: _Fit, shown: Bools, able: Bools) -> list[RefinedNumber]:
     numbers = []
     for k in range(problem.plays):
         if able[k]:
             value, sure = float(found.values[k]), float(found.sure[k])
             ends = max(value - 1.96 * sure, 0.0), value + 1.96 * sure
             name = f"weight at r = {problem.structure.thresholds[k]:.4g}"
-            numbers.append(Moved(name, float(problem.old[k]), value, ends, bool(shown[k])))
+            numbers.append(RefinedNumber(name, float(problem.old[k]), value, ends, bool(shown[k])))
     at = problem.plays
     for part in problem.structure.parts:
         for j in range(len(part.candidate.start)):
             value, sure = float(found.values[at]), float(found.sure[at])
             ends = math.exp(value - 1.96 * sure), math.exp(value + 1.96 * sure)
-            numbers.append(Moved(f"{part.name}, factor {j + 1}", 1.0, math.exp(value), ends, bool(shown[at])))
+            numbers.append(RefinedNumber(f"{part.name}, factor {j + 1}", 1.0, math.exp(value), ends, bool(shown[at])))
             at += 1
     return numbers
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import re
@@ -20,6 +21,7 @@ from hystgen.diagnosis.search.hypothesis import NotFiniteError
 from hystgen.identification import faults
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.quality import correlation_time
+from hystgen.plays import operators
 from hystgen.records import Record, Source
 
 Array = NDArray[np.float64]
@@ -39,8 +41,16 @@ DIRECTIONS = {
     "curve": "the curvature of the motion over the drive",
     "rate": "a lag behind the drive",
     "slow": "a slow response after moves",
+    "shape": "the shape of the motion",
 }
-"""Ways in which a unit can move away from its model, each a signal made from the model's expectation."""
+"""Ways in which a unit can move away from its model: each a signal made from the model's expectation, and `shape`, the
+part of the residual along these and further signals made from expectation and drive together, without a sign."""
+
+SHAPE = "shape"
+
+PLAYS = (0.05, 0.1, 0.2, 0.35)
+"""[fractions of the drive range] Thresholds of plays among the signals of `shape`: from a loop that hardly shows to the
+widest one that a session closes."""
 
 DRIFT_PASSES = 4
 """[passes] Drift is slower than the motion: cosines of up to one half period in this many passes over half the range
@@ -48,6 +58,10 @@ are taken out of the residual."""
 
 MOST_COSINES = 12
 """Number of these cosines at most, which bounds the time for long sessions."""
+
+FEWEST_SAMPLES = 100
+"""Fewest compared samples of a session: about four for each signal and cosine that its residual is split into, so that
+what is left of it shows the noise and its correlation."""
 
 COLLINEAR = 1e-3
 """[fraction of its size] A direction of which drift and offset leave less than this is not seen in a session."""
@@ -133,31 +147,50 @@ class Session:
             "curve": (y - 0.5 * (float(y.max()) + float(y.min()))) ** 2 / half,
         }
         if self.item.timed:
-            found |= {"rate": -np.gradient(y, t), "slow": _slow(y, t)}
+            found |= {"rate": -np.gradient(y, t), "slow": np.mean(_slow_parts(y, t), axis=0)}
         steady = {name: self._steady(x) for name, x in found.items()}
         return {name: x for name, x in steady.items() if _rms(x) > COLLINEAR * _rms(found[name] - np.mean(found[name]))}
 
     @cached_property
-    def structured(self) -> float:
-        """rms of the part of the residual along all directions together, less that of noise alone, output units."""
-        part, spread = self._explained
-        return math.sqrt(max(_rms(part) ** 2 - len(self._along) * spread**2, 0.0))
+    def _signals(self) -> Array:
+        """(N, k) All signals that the residual may follow, without offset and drift, each of rms 1."""
+        y, v, t = self.expected[self.known], self.item.run.v[self.known], self.item.run.t[self.known]
+        span = float(np.ptp(v))
+        more = [operators.play(v, part * span, float(v[0])) for part in PLAYS]
+        more += [(v - v.min()) ** 2 / span, (v - v.min()) ** 3 / span**2, np.asarray(v)]
+        if self.item.timed:
+            more += list(_slow_parts(y, t))
+        signals = [*self._along.values(), *(self._steady(x) for x in more)]
+        return np.column_stack([x / _rms(x) for x in signals if _rms(x) > 0.0])
 
     @cached_property
-    def _explained(self) -> tuple[Array, float]:
-        """The part of the residual along all directions, and the standard deviation of noise along one of them."""
-        table = np.column_stack([x / _rms(x) for x in self._along.values()] or [np.zeros(len(self.known))])
-        part = table @ np.linalg.lstsq(table, self.residual, rcond=COLLINEAR)[0]
-        rest = self.residual - part
-        return part, _rms(rest) * math.sqrt(correlation_time(rest) / len(rest))
+    def structured(self) -> float:
+        """rms of the part of the residual along all signals together, less that of noise alone, output units."""
+        part, number, spread = self.explained
+        return math.sqrt(max(part**2 - number * spread**2, 0.0))
+
+    @cached_property
+    def explained(self) -> tuple[float, int, float]:
+        """rms of the part of the residual along all signals, the number of these that are not combinations of others,
+        and the standard deviation of noise along one of them."""
+        table = self._signals
+        solution, _, number, _ = np.linalg.lstsq(table, self.residual, rcond=COLLINEAR)
+        rest = self.residual - table @ solution
+        free = max(len(rest) - int(number) - self._drift.shape[1], 1)
+        spread = math.sqrt(float(rest @ rest) * correlation_time(rest) / (free * len(rest)))
+        return _rms(table @ solution), int(number), spread
 
     @cached_property
     def seen(self) -> dict[str, Seen]:
-        """Every direction that this session shows."""
-        return {
-            name: Seen(_rms(x), float(self.residual @ x) / (len(x) * _rms(x)), self._explained[1])
+        """Every direction that this session shows; of `shape` the part is a logarithm."""
+        explained, number, spread = self.explained
+        found = {
+            name: Seen(_rms(x), float(self.residual @ x) / (len(x) * _rms(x)), spread)
             for name, x in self._along.items()
         }
+        if found:  # the logarithm of the root of a chi-square number
+            found[SHAPE] = Seen(1.0, math.log(max(explained, 1e-300)), 1.0 / math.sqrt(2.0 * number))
+        return found
 
     @property
     def gain(self) -> float | None:
@@ -177,17 +210,14 @@ def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2))) if len(x) else 0.0
 
 
-def _slow(y: Array, t: Array) -> Array:
-    """What slow exponentials, one a decade of time constants, add to a signal: creep of one part in three."""
-    total, step = np.zeros(len(y)), float(np.median(np.diff(t)))
-    span = float(np.ptp(t))
-    taus = np.geomspace(10.0 * step, 0.3 * span, max(1, round(math.log10(max(0.03 * span / step, 10.0)))))
+def _slow_parts(y: Array, t: Array) -> Array:
+    """(k, N) What slow exponentials add to a signal, one a decade of time constants from ten samples to the record."""
     from scipy.signal import lfilter
 
-    for tau in taus:
-        share = -math.expm1(-step / tau)
-        total += lfilter([share], [1.0, share - 1.0], y - y[0]) - (y - y[0])
-    return total / len(taus)
+    step, span = float(np.median(np.diff(t))), float(np.ptp(t))
+    number = max(2, 1 + round(math.log10(max(0.1 * span / step, 10.0))))
+    shares = -np.expm1(-step / np.geomspace(10.0 * step, max(span, 20.0 * step), number))
+    return np.array([lfilter([share], [1.0, share - 1.0], y - y[0]) - (y - y[0]) for share in shares])
 
 
 def in_order(records: Sequence[Record], sources: Sequence[Source]) -> tuple[list[Record], str]:
@@ -204,7 +234,7 @@ def in_order(records: Sequence[Record], sources: Sequence[Source]) -> tuple[list
         keys = ["".join(part or "00" for part in found.groups()) for found in dated if found]
         return [records[k] for k in sorted(range(len(keys)), key=keys.__getitem__)], "dates in the file names"
     by_time = sorted(records, key=lambda each: float(each.t[0]))
-    apart = all(float(a.t[-1]) < float(b.t[0]) for a, b in zip(by_time, by_time[1:], strict=False))
+    apart = all(float(a.t[-1]) < float(b.t[0]) for a, b in itertools.pairwise(by_time))
     if len(records) > 1 and apart and all(record.timed for record in records):
         return by_time, "times of the records"
     return list(records), "order in which they were given"
@@ -237,7 +267,12 @@ def compared(
             notes.append(f"{record.name} is left out: an effect of the model gives no finite output")
             continue
         session = Session(record.name, record, item, error)
-        if session.seen:
+        if len(session.known) < FEWEST_SAMPLES:
+            notes.append(
+                f"{record.name} is left out: only {len(session.known)} samples can be compared, since its start memory "
+                f"is unknown, and at least {FEWEST_SAMPLES} are needed; give --history"
+            )
+        elif session.seen:
             found.append(session)
         else:
             notes.append(f"{record.name} is left out: its drive hardly moves")
