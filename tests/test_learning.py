@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -97,9 +98,9 @@ def test_the_error_of_a_blind_stage_falls_and_never_rises_by_more_than_noise(see
     one = blind.stage(seed)
     found = list(blind.passes(one, blind.identified(one), 3))
     low, noise = blind.below(found, 40.0), found[-1].report.passes[-1].floor
-    assert all(after <= before + 2.0 * noise * 2**0.5 for before, after in zip(low, low[1:], strict=False))
+    assert all(after <= before + 2.0 * noise * 2**0.5 for before, after in itertools.pairwise(low))
     assert low[-1] < 0.25 * low[0]
-    assert all(after < before for before, after in zip(low[:3], low[1:3], strict=False))
+    assert all(after < before for before, after in itertools.pairwise(low[:3]))
 
 
 def test_a_model_that_helps_comes_first(tmp_path: Path, run: Callable[..., tuple[int, str, str]]) -> None:

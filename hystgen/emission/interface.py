@@ -441,14 +441,11 @@ def _influences(one: EmittedModel) -> list[Macro]:
     """Indices of the columns that `set_influence` sets, with the limits of each, beyond which it is limited."""
     assert one.compiled
     t = one.compiled.tables.columns
-    rows = [row for row, entry in zip(t.block, t.entry, strict=True) if entry >= 0]
-    units = [2.0 ** int(row["bits"]) * unit if one.compiled.tables.fixed else 1.0
-             for row, unit in zip(rows, t.unit[t.entry >= 0], strict=True)]
+    ends = ((low, high) for low, high, entry in zip(t.lowest, t.highest, t.entry, strict=True) if entry >= 0)
     return [
-        (f"INFLUENCE_{macro}", f"{i}u", f"index of column {comment_text(column)}, limited to "
-         f"{row['lowest'] / unit:.6g} .. {row['highest'] / unit:.6g}")
-        for i, (macro, column, row, unit) in enumerate(
-            zip(influence_macros(one.columns), one.columns, rows, units, strict=True)
+        (f"INFLUENCE_{macro}", f"{i}u", f"index of column {comment_text(column)}, limited to {low:.6g} .. {high:.6g}")
+        for i, (macro, column, (low, high)) in enumerate(
+            zip(influence_macros(one.columns), one.columns, ends, strict=True)
         )
     ]
 

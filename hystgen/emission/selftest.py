@@ -150,11 +150,8 @@ def _setting(t: ChainTables, code: int, call: str, turn: int) -> float:
     if call in ("set_temperature", "set_influence"):
         columns, entry = t.columns, code - SETTINGS[call] if call == "set_influence" else -1
         j = columns.entry.tolist().index(entry)
-        scale = columns.unit[j] if t.fixed else 1.0
-        ends = (columns.block[end][j] for end in ("lowest", "highest"))
-        low, high = (float(end) / 2.0 ** int(columns.block["bits"][j] if t.fixed else 0) for end in ends)
-        far = 40.0 * scale if call == "set_temperature" else high - low
-        return float(scale * columns.middle[j] + far * way)
+        far = 40.0 if call == "set_temperature" else columns.highest[j] - columns.lowest[j]
+        return float(columns.unit[j] * (columns.middle[j] + far * way))
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":

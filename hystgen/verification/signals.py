@@ -205,11 +205,9 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         _, gain = setting_codes(tables)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
         for j, call in enumerate(set_by.tolist()):
-            low_end, high_end = (float(columns.block[end][j]) for end in ("lowest", "highest"))
-            code = 2.0 ** int(columns.block["bits"][j]) if tables.fixed else 1.0
-            far = 30.0 * columns.unit[j] if call == slots.OP_TEMPERATURE else math.inf
-            span = min((high_end - low_end) / code, far)
-            x = np.where(op == call, columns.unit[j] * columns.middle[j] + rng.standard_cauchy(length) * span, x)
+            far = 30.0 if call == slots.OP_TEMPERATURE else math.inf
+            span = min(columns.highest[j] - columns.lowest[j], far)
+            x = np.where(op == call, columns.unit[j] * (columns.middle[j] + rng.standard_cauchy(length) * span), x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
         x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(-1.0, 9.0, length), x)
         odd = rng.random(length) < np.where(op == slots.OP_STEP, 0.01, 0.1)

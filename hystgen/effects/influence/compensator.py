@@ -120,7 +120,8 @@ COURSE_KIND = BlockKind(
 class GainTables(NamedTuple):
     """All gains of a model: `block` (k,); `course` (k,), in use where `winding` (k,) is 1, with the plays of each from
     `first` (k + 1) on in `play` (m,); `entry` (k,): the index of its setting, -1 for the temperature; `unit` (k,): the
-    value by which a caller sets it per unit of the column, 1 or codes; `middle` (k,): where the gain is 1, in units."""
+    value by which a caller sets it per unit of the column, 1 or codes; `middle` (k,): where the gain is 1, in units,
+    and `lowest`, `highest` (k,): where the column is limited."""
 
     block: GainTable
     course: CourseTable
@@ -130,6 +131,8 @@ class GainTables(NamedTuple):
     entry: Counts
     unit: Reals
     middle: Reals
+    lowest: Reals
+    highest: Reals
 
 
 class GainMemory(NamedTuple):
@@ -264,6 +267,8 @@ def tables(blocks: Sequence[Followed], about: FloatSurroundings) -> GainTables:
         entries(blocks),
         np.ones(len(laws)),
         np.array([wide.law.reference for wide in laws]),
+        np.array([wide.lowest for wide in laws]),
+        np.array([wide.highest for wide in laws]),
     )
 
 

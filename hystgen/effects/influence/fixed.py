@@ -108,6 +108,8 @@ def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> GainTables:
         floating.entries([each.one for each in blocks]),
         np.array([2.0**each.code for each in blocks]),
         np.array([each.wide.law.reference for each in blocks]),
+        np.array([each.wide.lowest for each in blocks]),
+        np.array([each.wide.highest for each in blocks]),
     )
 
 
