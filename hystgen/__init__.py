@@ -29,10 +29,13 @@ if TYPE_CHECKING:
     from hystgen.cascade import Cascade as Cascade
     from hystgen.cascade import InverseCascade as InverseCascade
     from hystgen.compensator.reference import Session as Session
+    from hystgen.degaussing import degauss as degauss
     from hystgen.distribution.fmu import fmu as fmu
     from hystgen.distribution.libraries import build as build
     from hystgen.emission.calls import differences as differences
     from hystgen.emission.calls import emit as emit
+    from hystgen.emission.units import blob as blob
+    from hystgen.emission.units import show_blob as show_blob
     from hystgen.fleet.batch import identify_batch as identify_batch
     from hystgen.front.dead_zone.model import DeadZone as DeadZone
     from hystgen.front.tanh.model import TanhEnvelope as TanhEnvelope
@@ -60,9 +63,11 @@ _NAMES = {
     "basics.problems": ("FormatError", "NotInvertibleError", "ParameterError", "SampleWarning"),
     "cascade": ("Cascade", "InverseCascade", "PI"),
     "compensator.reference": ("Session",),
+    "degaussing": ("degauss",),
     "distribution.fmu": ("fmu",),
     "distribution.libraries": ("build",),
     "emission.calls": ("differences", "emit"),
+    "emission.units": ("blob", "show_blob"),
     "fleet.batch": ("identify_batch",),
     "front.dead_zone.model": ("DeadZone",),
     "front.tanh.model": ("TanhEnvelope",),

@@ -34,6 +34,7 @@ ROOMS = (
     "records",
     "model",
     "simulation",
+    "degaussing",
     "emission",
     "verification",
     "distribution",

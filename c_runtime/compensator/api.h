@@ -19,12 +19,24 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied);
 /* One sample from code to code. Commits the drive that the returned code makes. Cannot fail. */
 int32_t hystgen_inverse_step_code(hystgen_inverse_t *self, int32_t code);
 #endif
+/* Change of the drive that other parameters make for the displacement expected now. With `take` they
+   replace those of the instance, and the memory is carried over: each play stays as near to where
+   it is as the one before it allows, and states of effects go on. */
+hystgen_real_t hystgen_inverse_exchange(hystgen_inverse_t *self, const hystgen_parameters_t *next,
+                                        bool take);
 /* The reference that a code of the reference's converter stands for. */
 hystgen_real_t hystgen_reference_from_code(int32_t code);
 /* The drive that a code of the drive's converter makes. */
 hystgen_real_t hystgen_drive_from_code(int32_t code);
 /* The code whose drive is nearest to this one, among those of the drive's converter. */
 int32_t hystgen_code_from_drive(hystgen_real_t drive);
+/* Begins a sequence of drives that erases the memory, at the present drive. */
+void hystgen_degauss_init(hystgen_degauss_t *self, hystgen_real_t start);
+/* The next drive of the sequence, at its end the last one again. Apply it, and report it to the
+   instances with a step of the forward operator, or a step and a commit of the inverse. */
+hystgen_real_t hystgen_degauss_step(hystgen_degauss_t *self);
+/* Whether the sequence has ended. */
+bool hystgen_degauss_done(const hystgen_degauss_t *self);
 /* HYSTGEN_STATUS_* bits since the last call; reading clears them. */
 unsigned int hystgen_operator_status(hystgen_operator_t *self);
 /* Begins to watch the error of the model. */

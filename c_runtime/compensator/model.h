@@ -82,6 +82,16 @@ extern const hystgen_start_t hystgen_operator_start[2];
 #define HYSTGEN_CODE_STEP 1
 #define HYSTGEN_CODE_STEP_BITS 1u
 
+#define HYSTGEN_DEGAUSS_TURN_COUNT 3u
+typedef struct {
+    hystgen_real_t drive;
+    uint_least16_t turn;
+    uint32_t left;
+} hystgen_degauss_t;
+extern const hystgen_real_t hystgen_degauss_turn[HYSTGEN_DEGAUSS_TURN_COUNT];
+extern const hystgen_real_t hystgen_degauss_move[1];
+extern const uint32_t hystgen_degauss_rest[2];
+
 #ifdef HYSTGEN_HAS_FRONT
 #ifdef HYSTGEN_FIXED
 #define HYSTGEN_FRONT_PIECES 20u

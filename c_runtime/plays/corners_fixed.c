@@ -47,7 +47,12 @@ static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_
 
 /* Reverses the move, and leaves a corner if plays have followed. */
 HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *corner) {
+#ifdef HYSTGEN_HAS_PARAMETERS
+    /* whatever the numbers of a block, blocks shrink towards the top, so corners have room */
+    if (here->k > 0 && (here->depth == 0 || here->k < corner[here->depth - 1].top)) {
+#else
     if (here->k > 0) {
+#endif
         hystgen_leave_corner(here, corner);
         here->k = 0;
     }

@@ -43,7 +43,12 @@ HYSTGEN_SWIFT void hystgen_reverse(const hystgen_curve_t *t, hystgen_plays_t *m,
     const hystgen_segment_t *s = &t->segment[m->here.k];
     const hystgen_direction_t on = m->here.rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
     const hystgen_direction_t back = m->here.rising ? HYSTGEN_FALLING : HYSTGEN_RISING;
+#ifdef HYSTGEN_HAS_PARAMETERS
+    /* whatever the numbers of a block, blocks shrink towards the top, so corners have room */
+    if (m->here.k > 0 && m->here.k < corner[m->here.depth - 1].top) {
+#else
     if (m->here.k > 0) {
+#endif
         const hystgen_real_t x = hystgen_along(m, m->here.input);
         hystgen_corner_t *c = &corner[m->here.depth];
         c->output = m->here.output;
@@ -99,6 +104,9 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
     hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
     bool limits = stop;  /* the plays may stop in this block */
+#ifdef HYSTGEN_HAS_PARAMETERS
+    k = k < c->top ? k : c->top - 1u; /* whatever the numbers of a block */
+#endif
     if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
 #ifndef HYSTGEN_HAS_NO_LIMIT
         limits = stop || hystgen_above(t->segment[c->top].reach, t->inside[on] - start);

@@ -173,6 +173,10 @@ layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,
 )
+tables_option = click.option(
+    "--tables", type=click.Choice(["constant", "runtime"]), default="constant", show_default=True,
+    help="runtime: the C loads a unit's numbers from a block (hystgen blob)",
+)
 skip_option = click.option(
     "--skip", type=Seconds(), callback=seconds, default=0.0,
     help="seconds at the start of every record to leave out of the comparison; their drive still counts",

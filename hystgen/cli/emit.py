@@ -46,6 +46,7 @@ class Emitted:
 @common.engine_option
 @common.optimize_option
 @common.layout_option
+@common.tables_option
 @click.option(
     "--integration", multiple=True, callback=common.words, metavar="TOOL,..",
     help="also write a folder NAME/ for build tools: " + ", ".join(INTEGRATIONS),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @common.engine_option
 @common.optimize_option
 @common.layout_option
+@common.tables_option
 @common.partial_option
 @common.health_option
 @common.effects_option

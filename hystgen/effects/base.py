@@ -246,6 +246,8 @@ class Effect(BaseModel):
     """further columns that every effect of this class needs"""
     fades: ClassVar[bool] = False
     """whether a pause before a record with a known history brings its start state to rest"""
+    forgets: ClassVar[bool] = True
+    """whether drives or a rest can erase what it remembers"""
     settled: ClassVar[tuple[str, ...]] = ()
     """keys that a refit leaves unchanged: conventions, and parameters that a fit cannot separate from others"""
     later: ClassVar[tuple[str, ...]] = ()

@@ -15,7 +15,7 @@ from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
 from hystgen.effects import CATALOGUE, shapes
 from hystgen.emission import module
-from hystgen.emission.options import INTEGRATIONS, LAYOUTS, OPERATORS, Options
+from hystgen.emission.options import INTEGRATIONS, LAYOUTS, OPERATORS, TABLES, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
 
@@ -40,12 +40,13 @@ def emit_options(
     manifest: bool = False,
     integration: Sequence[str] = (),
     health: bool = False,
+    tables: str = "constant",
 ) -> Options:
     """The options to emit with: the arguments given, else the parameter file's `emit` section.
 
     `allow_partial`: effects that the C cannot include are left out, and named in its banner; `manifest`: whether to
     write a manifest too; `integration`: the tools for which to write packages; `health`: whether the C watches the
-    model's error.
+    model's error; `tables`: constant or runtime.
     """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
@@ -54,6 +55,7 @@ def emit_options(
     arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
+    arguments.choice("tables", tables, TABLES)
     tools = tuple(dict.fromkeys(arguments.words("integration", integration, "cmake")))
     for tool in tools:
         arguments.choice("integration", tool, INTEGRATIONS)
@@ -68,7 +70,7 @@ def emit_options(
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
     engine = model.engine(engine, operator, arithmetic, optimize)
-    return Options(operator, arithmetic, engine, layout, left_out, manifest, health, tools)
+    return Options(operator, arithmetic, engine, layout, left_out, manifest, health, tools, tables)
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:

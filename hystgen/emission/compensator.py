@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.measured import Measured
     from hystgen.compensator.converter import CodeConversion
     from hystgen.compensator.health import Watch
+    from hystgen.degaussing import Degauss
     from hystgen.model import Model
 
 Macro: TypeAlias = tuple[str, str, str]
@@ -429,8 +430,8 @@ def influence_macros(columns: Sequence[str]) -> list[str]:
 @dataclass(frozen=True)
 class EmittedModel:
     """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain;
-    `conversion`: None unless the inverse has converters; `watch`: None unless the C watches the model's
-    error."""
+    `conversion`: None unless the inverse has converters; `watch`: None unless the C watches the model's error;
+    `erasing`: the sequence that erases the memory, if the file asks for one."""
 
     model: Model
     options: Options
@@ -443,6 +444,7 @@ class EmittedModel:
     glue: Glue | None
     conversion: CodeConversion | None = None
     watch: Watch | None = None
+    erasing: Degauss | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -467,7 +469,8 @@ class EmittedModel:
         t = self.numbers.tables
         limited = self.options.inverse and isinstance(t, Tables | FixedTables) and not t.has_front
         known = not limited and self.options.layout != "shared-runtime"
-        return frozenset({"HYSTGEN_HAS_NO_LIMIT"} if known else ())
+        guarded = self.options.tables == "runtime" and self.options.layout != "shared-runtime"
+        return frozenset(["HYSTGEN_HAS_NO_LIMIT"] * known + ["HYSTGEN_HAS_PARAMETERS"] * guarded)
 
     @property
     def units(self) -> UnitTexts:

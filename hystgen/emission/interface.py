@@ -59,7 +59,9 @@ def command(parameters: Parameters, options: Options) -> str:
         origins = {own_effects.origin(type(each)): None for each in effects if each.name.startswith(USER)}
     more = " --health" * options.health + " --allow-partial" * bool(options.left_out)
     more += "".join(f" --effects {shlex.quote(each)}" for each in origins)
-    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
+    chosen = " ".join(
+        f"--{key} {getattr(options, key)}" for key in OPTIONS if getattr(options, key) != "constant"
+    )
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
@@ -206,9 +208,9 @@ def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str
     ]
     single = f" Define {one.names.NAME}_IMPLEMENTATION in one C file before including this header."
     use = (
-        "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
-        f"the parameter file; reset restarts with all plays at 0.{single * (options.layout == 'single-header')}"
-        f"{one.form.warning}"
+        f"Use: {'load a block, then ' * (options.tables == 'runtime')}one instance per actuator, init once, then step "
+        "from one context only. init takes the start memory of the parameter file; reset restarts with all plays at 0."
+        f"{single * (options.layout == 'single-header')}{one.form.warning}"
     )
     shapes = ((effect.name, getattr(effect, "shape", "")) for effect in parameters.model.effects if effect.block)
     blocks = dict.fromkeys(f"{name} ({shape})" if shape else name for name, shape in shapes)
@@ -227,7 +229,8 @@ def details(one: EmittedModel, notes: Sequence[str], estimate: Cost) -> list[str
         "Cost (32-bit target):",
         f"    code at -O2       about {estimate.code_words}, as measured for a similar model with 10 plays"
         f"{uncounted}",
-        f"    constant tables   {estimate.memory.tables} bytes",
+        f"    constant tables   {estimate.memory.tables} bytes" if options.tables == "constant" else
+        f"    parameters        about {estimate.memory.tables} bytes of RAM for each unit, loaded from a block",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
         *(f"    {op} step, costliest: about {estimate.dearest_words(op)}, as measured for similar models{uncounted}"
@@ -270,7 +273,7 @@ def version_number() -> int:
     return 10000 * major + 100 * minor + patch
 
 
-def _defined(one: EmittedModel, macros: Iterable[Macro]) -> list[str]:
+def defined(one: EmittedModel, macros: Iterable[Macro]) -> list[str]:
     return [define(f"{one.names.NAME}_{name}", value, comment) for name, value, comment in macros]
 
 
@@ -291,7 +294,7 @@ def typedefs(one: EmittedModel) -> list[str]:
     return [codes, real, *(own if names.rt == names.name else [])]
 
 
-def limits(one: EmittedModel) -> list[str]:
+def limits(one: EmittedModel) -> list[Macro]:
     """The header's macros for a model's numbers."""
     numbers, form, units = one.numbers, one.form, one.units
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
@@ -310,6 +313,10 @@ def limits(one: EmittedModel) -> list[str]:
     ]
     found += _codes(one)
     found += _health(one)
+    if one.erasing:
+        from hystgen.emission import degauss
+
+        found += degauss.macros(one.erasing, units.behind("output"))
     for each in errors(one):
         comment = f"{each.what}, {form.counted(each.side, each.unit)}"
         if each.samples is not None:
@@ -317,7 +324,7 @@ def limits(one: EmittedModel) -> list[str]:
         if each.condition:
             comment = f"the same while {each.condition}"
         found.append((each.macro, operand(each.value), comment))
-    return _defined(one, found)
+    return found
 
 
 @dataclass(frozen=True)
@@ -470,7 +477,7 @@ def status(one: EmittedModel) -> list[str]:
     if one.watch:
         words = "returned by health_update: the error of the model is outside its band"
         bits.append(("STATUS_MODEL_LEFT", f"{MODEL_LEFT}u", words))
-    return _defined(one, bits)
+    return defined(one, bits)
 
 
 # Calls
@@ -519,6 +526,12 @@ CALLS = {
     "reference_from_code": CallFacts("at any time", _FEW),
     "drive_from_code": CallFacts("at any time", _FEW),
     "code_from_drive": CallFacts("at any time", _FEW),
+    "exchange": CallFacts(
+        "after commit and before the next step", "that of two steps, and three instances on the stack"
+    ),
+    "degauss_init": CallFacts("before the first step of the sequence; again to begin another", _FEW),
+    "degauss_step": CallFacts("after its init; once every sample time, until done", _FEW),
+    "degauss_done": CallFacts("after its init", _FEW),
     "step_code": CallFacts(
         "after init; once every sample time, from one context, in place of step and commit",
         "that of a step, of commit and of three conversions",
@@ -538,7 +551,12 @@ def documented(one: EmittedModel, cost: Cost) -> Iterator[Piece]:
         brief = piece.text.partition("/*")[2].partition("*/")[0]
         words = " ".join(re.sub(r"^ *\* ?", " ", line) for line in brief.splitlines())
         call, op = found["call"], found["op"]
-        names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
+        code, given = piece.code, found["given"]
+        if one.options.tables == "runtime" and (call == "init" or not op) and call not in runtime.CONSTANT:
+            pointer = "const hystgen_parameters_t *p"
+            given = f"{given}, {pointer}" if op else f"{pointer}, {given}"
+            code = code.replace(f"({found['given']})", f"({given})")
+        names = [re.findall(r"\w+", each)[-1] for each in given.split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
         lines += [(f"@param {name}", _parameter(name, call, one)) for name in names]
         if found["answer"] != "void":
@@ -548,8 +566,18 @@ def documented(one: EmittedModel, cost: Cost) -> Iterator[Piece]:
             ("@note", f"Status bits: {_bits(call, op, one)}"),
             ("@note", f"Cost: {_cost(call, op, one, cost)}"),
         ]
+        if one.options.tables == "runtime":
+            lines = [(mark, _of_parameters(text, one)) for mark, text in lines]
         above = "\n".join(["/**", *(line for mark, text in lines for line in _line(mark, text)), " */"])
-        yield Piece(piece.name, f"{above}\n{piece.code.lstrip()}\n", piece.uses)
+        yield Piece(piece.name, f"{above}\n{code.lstrip()}\n", piece.uses)
+
+
+def _of_parameters(text: str, one: EmittedModel) -> str:
+    """A text in which members of the parameters stand for the macros of the same numbers."""
+    ends = rf"\b(?:HYSTGEN|{one.names.NAME})_(DRIVE|OUTPUT)_MIN \.\. MAX"
+    text = re.sub(ends, lambda found: f"{found[1].lower()}_min .. {found[1].lower()}_max of the parameters", text)
+    lsb = rf"\b{one.names.NAME}_(\w+_LSB)\b"
+    return re.sub(lsb, lambda found: f"the parameters' {found[1].lower()}", text)
 
 
 def _line(mark: str, text: str) -> list[str]:
@@ -570,7 +598,14 @@ def _unit(what: str, one: EmittedModel) -> str:
 def _parameter(name: str, call: str, one: EmittedModel) -> str:
     form, macros = one.form, one.names.NAME
     if name == "self":
-        return "the instance"
+        return "the sequence" if call.startswith("degauss") else "the instance"
+    if name in ("next", "take"):
+        return {
+            "next": "the other parameters, loaded by the same module, which stay the caller's; in fixed point with the "
+            "same sizes of codes", "take": "whether to take them, or only to ask",
+        }[name]
+    if name == "p":
+        return "the parameters of the unit, which stay the caller's and have to stay where they are"
     held = "" if call.startswith("health") else form.unless_held(call)
     if name in form.settings:
         return form.settings[name].replace("MODEL", macros) + held
@@ -585,12 +620,13 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         ),
         "expected": _unit("output", one) + f", {expected(one)}",
         "i": f"index of the column, one of {macros}_INFLUENCE_*; any other is ignored, and reported as limited",
+        "start": drive,
         "travel": "total distance that the drive has moved, in units of the drive",
         "code": f"code of the converter, {macros}_{'DRIVE' if call == 'drive_from_code' else 'REFERENCE'}_CODE_MIN .. "
         "MAX, beyond which it is limited; codes in two's complement have their sign extended to 32 bits",
         "drive": _unit("drive", one) + "; NaN gives the lowest code" * bool(held),
     }[name]
-    return what + held * (name not in ("code", "drive"))
+    return what + held * (name not in ("code", "drive", "start"))
 
 
 def expected(one: EmittedModel) -> str:
@@ -612,9 +648,12 @@ def _answer(call: str, op: str | None, one: EmittedModel) -> str:
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "health_update":
         return f"{one.names.NAME}_STATUS_MODEL_LEFT if the last whole window is outside its band, else 0"
+    if call == "degauss_done":
+        return "true after the last drive"
     if call == "travel":
         return "total distance that the drive has moved, in units of the drive"
-    return _unit("drive" if op == "inverse" and call == "step" else "output", one)
+    drive = (op == "inverse" and call == "step") or call in ("degauss_step", "exchange")
+    return _unit("drive" if drive else "output", one)
 
 
 def _bits(call: str, op: str | None, one: EmittedModel) -> str:

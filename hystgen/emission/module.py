@@ -7,11 +7,13 @@ import importlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from hystgen.chain.static import StaticModel
-from hystgen.emission import chain, cost, interface, runtime, selftest
-from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Names, Numbers, Writer
+from hystgen.emission import block, chain, cost, interface, runtime, selftest
+from hystgen.emission.block import Parameters
+from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Macro, Names, Numbers, Writer
 from hystgen.emission.cost import Cost, Data
 from hystgen.emission.folding import PLAIN, Members
 from hystgen.emission.options import Options, seal
@@ -22,6 +24,7 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
+    from hystgen.emission.snapshot import InstanceState
     from hystgen.model import Model
 
 WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
@@ -55,11 +58,23 @@ def compensator(model: Model, options: Options) -> EmittedModel:
         variant = dataclasses.replace(variant, watched=True)
         macros = ((name, operand(value), "") for name, value in watch.macros)
         numbers = dataclasses.replace(numbers, macros=(*numbers.macros, *macros))
+    erasing = None
+    if model.parameters.emit.degauss is not None:
+        from hystgen.emission import degauss
+
+        erasing = degauss.of(model, options.arithmetic)
+        variant = dataclasses.replace(variant, erases=True)
+        numbers = degauss.with_sequence(numbers, erasing, writer)
+    plain = variant.moves in ("", "play") and not variant.bent and not variant.elements
+    if options.tables == "runtime" and options.inverse and loop and plain:
+        variant = dataclasses.replace(variant, exchanges=True)
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)
     elif loop:
         glue = chain.glue(variant, chain.ChainBlocks.none(options.operators), form, (), model.cascade.pi.n)
-    return EmittedModel(model, options, names, family, variant, form, numbers, compiled, glue, conversion, watch)
+    return EmittedModel(
+        model, options, names, family, variant, form, numbers, compiled, glue, conversion, watch, erasing
+    )
 
 
 def _variant(
@@ -95,6 +110,8 @@ class Code:
     plays: tuple[ConstantTable, ...]
     beside: tuple[ConstantTable, ...]
     data: Data
+    parameters: Parameters | None = None
+    snapshots: tuple[InstanceState, ...] = ()
 
     @property
     def tables(self) -> str:
@@ -109,8 +126,19 @@ def front(one: EmittedModel) -> str:
     return f"{whole}\n{one.glue.functions}" if one.glue else whole
 
 
-def composed(one: EmittedModel) -> Code:
-    """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
+def parameters(model: Model, options: Options, sha256: str, room: Mapping[str, int]) -> Parameters:
+    """The parameters of a model in a module that loads them; `room`: entries of tables in that module whose lengths
+    follow from numbers. Raises FormatError."""
+    found = composed(compensator(model, options), sha256, room).parameters
+    assert found is not None
+    return found
+
+
+def composed(one: EmittedModel, sha256: str = "", room: Mapping[str, int] = MappingProxyType({})) -> Code:
+    """The C of a compensator; `sha256` and `room`: as for `parameters`.
+
+    Raises EffectsError if the C of a user's own effect is refused.
+    """
     family, names, operators, numbers = one.family, one.names, one.options.operators, one.numbers
     shared = one.options.layout == "shared-runtime"
     blocks: list[runtime.Piece] = []
@@ -121,6 +149,11 @@ def composed(one: EmittedModel) -> Code:
         given, given_functions = own.pieces(one.compiled.tables)
         blocks = list(declarations.pieces(family.kind))
     instances = [*one.glue.states.values()] if one.glue else runtime.state_pieces(one.variant, family, operators)
+    roots = [f"hystgen_{op}_t" for op in operators]
+    if one.erasing:
+        from hystgen.emission import degauss
+
+        instances, roots = [*instances, degauss.instance()], [*roots, *degauss.ROOTS]
     memory, of_tables = runtime.memory_pieces(family), runtime.table_pieces(family)
     pieces = runtime.operator_pieces(
         one.variant, operators, front(one), one.calls, given_functions, [*blocks, *instances]
@@ -139,21 +172,52 @@ def composed(one: EmittedModel) -> Code:
     memory, of_tables, own_types, pieces = (
         runtime.with_named(each, members, named) for each in (memory, of_tables, [*blocks, *given, *instances], pieces)
     )
+    used = _tables(written, names.name, members, [each.code for each in (*pieces, *kernels)])
+    numbered, number_names = dict[str, tuple[Macro, str]](), set[str]()
+    if one.options.tables == "runtime":
+        from hystgen.emission import snapshot
+
+        own_numbers = snapshot.numbers(one)
+        found = block.number_macros([*interface.limits(one), *numbers.macros, *own_numbers], family.kind == "fixed")
+        number_names = set(found)
+        guards = runtime.guards(one.variant)
+        aliases = {name: other for name, other in family.signals.items() if name in runtime.FINE}
+        named_tables = [f"hystgen{own.removeprefix(names.name)}" for own in used]
+        pieces = block.threaded(pieces, found, named_tables, aliases, guards)
+        own_types = [
+            runtime.with_members(each, [block.INSTANCE, *each.members])
+            if each.name in [f"hystgen_{op}_t" for op in operators] else each for each in own_types
+        ]
+        text = " ".join(each.code for each in pieces)
+        stated = {name for name, *_ in (*interface.limits(one), *own_numbers)}
+        numbered = {
+            name: each for name, each in found.items()
+            if name in stated or re.search(rf"->{block.member(name)}\b", text)
+        }
     called = sorted(runtime.used(pieces))
     kernels = runtime.needed([*of_tables, *kernels], called)
     carried = runtime.carried(family, pieces) if shared else []
     text = runtime.render_operators(pieces, names.name, one.corners, names.rt, family, carried)
-    used = _tables(written, names.name, members, [each.code for each in (*pieces, *kernels)])
     plays, beside = (
         [used[each.name] for each in every if each.name in used] for every in (numbers.plays, numbers.beside)
     )
     contents = [each for table in (*plays, *beside) for each in table.contents]
-    states = runtime.needed(own_types, [f"hystgen_{op}_t" for op in operators])
+    states = runtime.needed(own_types, roots)
     kinds = [f"hystgen_{kind}" for kind, _ in contents]
     tables = [piece for piece in runtime.needed(own_types, [*called, *kinds]) if piece not in states]
     watch = runtime.watch_pieces(one.variant)
+    made = None
+    states_of: tuple[InstanceState, ...] = ()
+    if one.options.tables == "runtime":
+        types = [*memory, *of_tables, *own_types]
+        made = block.parameters(
+            one, numbered, [*used.values()][::-1], types, [*pieces, *kernels], sha256, room
+        )
+        kernels = [each for each in kernels if each not in of_tables]
+        tables = [*([] if shared else [*memory * bool(one.corners), *of_tables]), *tables]
+        states_of = tuple(snapshot.instances(one, [*memory, *own_types]))
     shown = runtime.render_operators([*states, *watch], names.name, one.corners, names.rt, family)
-    if one.corners and not shared:
+    if one.corners and not shared and not made:
         shown = f"{runtime.all_types(memory, names.rt, family)}\n{shown}"
     return Code(
         types=runtime.render_operators(tables, names.name, 0, names.rt, family),
@@ -163,10 +227,12 @@ def composed(one: EmittedModel) -> Code:
         operators=text,
         macros=tuple(
             define(f"{names.NAME}_{name}", value, comment)
-            for name, value, comment in numbers.macros if f"{names.NAME}_{name}" in text
+            for name, value, comment in numbers.macros if name not in number_names and f"{names.NAME}_{name}" in text
         ),
         plays=tuple(plays),
         beside=tuple(beside),
+        parameters=made,
+        snapshots=states_of,
         data=Data(
             family, [*memory, *of_tables, *tables, *states, *watch], plays,
             [*contents, *(each for piece in (*kernels, *pieces, *tables) for each in piece.contents)],
@@ -199,7 +265,14 @@ def implementation(one: EmittedModel, code: Code) -> str:
             family.closing if single else (),
         )
     )
-    texts = (code.kernels, code.types, code.tables, code.operators)
+    texts: tuple[str, ...] = (code.kernels, code.types, code.tables, code.operators)
+    if code.parameters:
+        macros = "\n".join(code.macros)
+        from hystgen.emission import snapshot
+
+        texts = (
+            code.kernels, macros, code.operators, block.loader(code.parameters), snapshot.functions(code.snapshots)
+        )
     return "\n".join((interface.overview("\n".join(texts)), opening, apart, *texts, closing))
 
 
@@ -218,6 +291,11 @@ class Module:
     reading: Sequence[str]
     doubts: Sequence[str]
 
+    @property
+    def parameters(self) -> Parameters | None:
+        """The parameters that it loads, if they are not constants."""
+        return self.code.parameters
+
 
 def of(model: Model, options: Options, sha256: str = "") -> Module:
     """The module of a model; `sha256`: hash of the parameters in the file, by default the hash of the model's.
@@ -225,7 +303,8 @@ def of(model: Model, options: Options, sha256: str = "") -> Module:
     Raises FormatError.
     """
     one = compensator(model, options)
-    made = composed(one)
+    sha256 = sha256 or parameters_sha256(model.parameters)
+    made = composed(one, sha256)
     dynamic: list[str] = []
     if one.compiled and options.inverse:
         from hystgen.emission import doubts
@@ -233,7 +312,7 @@ def of(model: Model, options: Options, sha256: str = "") -> Module:
         dynamic = doubts.found(model.parameters, one.compiled)
     return Module(
         one, made, cost.estimate(model.cascade, options, one.numbers.tables, made.data),
-        sha256 or parameters_sha256(model.parameters), [*interface.reading(one), *interface.watched(one)],
+        sha256, [*interface.reading(one), *interface.watched(one)],
         [*dynamic, *interface.unbounded(one), *interface.misread(one)],
     )
 
@@ -244,6 +323,7 @@ def files(module: Module) -> dict[str, str]:
     name, options, family = one.names.name, one.options, one.family
     command = interface.command(one.model.parameters, options)
     whole = implementation(one, made)
+    numbered = block.number_macros(interface.limits(one), family.kind == "fixed")
     single, source = options.layout == "single-header", f"{name}.c"
     shared = options.layout == "shared-runtime"
 
@@ -254,6 +334,8 @@ def files(module: Module) -> dict[str, str]:
     found = {
         f"{name}.h": template(
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,
+            limits=[each for each in interface.limits(one) if not made.parameters or each[0] not in numbered],
+            reasons=block.REASONS,
             banner=top(f"{name}.h", f"{WHAT[options.operator]} of {name}", details),
             build=runtime.verbatim(family.build, name, family, name),
             api=runtime.api(interface.documented(one, module.cost), name, one.names.rt, family),
@@ -275,8 +357,10 @@ def files(module: Module) -> dict[str, str]:
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        text = template(f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows,
-                        fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD)
+        text = template(
+            f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows,
+            fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD, block=block.words(made.parameters),
+        )
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
     return {file: seal(_tidy(fit(text))) for file, text in found.items()}

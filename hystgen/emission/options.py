@@ -14,10 +14,12 @@ OPTIONS = {
     "arithmetic": tuple(ARITHMETICS),
     "engine": ("corners", "loop"),
     "layout": ("self-contained", "shared-runtime", "single-header"),
+    "tables": ("constant", "runtime"),
 }
 """Command options that a banner records, and their values."""
 
 LAYOUTS = OPTIONS["layout"]
+TABLES = OPTIONS["tables"]
 OPERATORS = OPTIONS["operator"]
 
 INTEGRATIONS = ("cmake", "meson", "conan", "platformio", "arduino", "zephyr", "espidf")
@@ -34,8 +36,9 @@ _SEAL = rf'(?m)^{_MARK}Text: sha256 ([0-9a-f]{{64}}), (?:of this file )?without 
 class Options:
     """The options of emission: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
 
-    `left_out`: a sentence for each effect that the C leaves out, if that is allowed; `manifest`: whether to write one;
-    `health`: whether the C watches the model's error; `integration`: the tools for which to write packages.
+    `tables`: constant, or runtime for parameters that a block carries; `left_out`: a sentence for each effect that the
+    C leaves out, if that is allowed; `manifest`: whether to write one; `health`: whether the C watches the model's
+    error; `integration`: the tools for which to write packages.
     """
 
     operator: str
@@ -46,6 +49,7 @@ class Options:
     manifest: bool = False
     health: bool = False
     integration: tuple[str, ...] = ()
+    tables: str = "constant"
 
     @property
     def operators(self) -> tuple[str, ...]:
@@ -85,6 +89,7 @@ def read_banner(text: str) -> Banner | None:
         return None
     given = re.findall(r" --(\w+) (\S+)", generated[2])
     options = {key: value for key, value in given if value in OPTIONS.get(key, ())}
+    options = {**({"tables": "constant"} if options else {}), **options}  # a banner states only the other value
     edited = sealed is not None and _hash(re.sub(_SEAL, "", text, count=1)) != sealed[1]
     model = re.match(r"hystgen emit (\w+)\.yaml ", generated[2])
     return Banner(printable(generated[1]), options, parameters[2], edited, model[1] if model else "")

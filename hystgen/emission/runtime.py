@@ -80,6 +80,17 @@ CODED = (
 
 WATCHING = ("hystgen_health_init", "hystgen_health_update")
 """Calls of a watch over the model's error."""
+ERASING = ("hystgen_degauss_init", "hystgen_degauss_step", "hystgen_degauss_done")
+"""Calls of the sequence that erases the memory."""
+
+CONSTANT = ("degauss_done",)
+"""Calls without an instance that need no number of the model."""
+
+EXCHANGING = ("hystgen_inverse_exchange",)
+"""Calls of an inverse that can take other parameters."""
+
+DRIVEN = frozenset([*CODED, *WATCHING, *ERASING, *EXCHANGING])
+"""Calls of `compensator/api.h` that only some models have."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +267,8 @@ class Variant:
     add to the interface; `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays;
     `elements`: number of elements in parallel with them; `tilted`: their drive is; `late_column`: a column acts
     through a lag; `coded`: the inverse takes and returns codes of converters; `watched`: the C watches the model's
-    error.
+    error; `erases`: it has a sequence of drives that erases the memory; `exchanges`: the inverse can take other
+    parameters.
     """
 
     engine: str
@@ -281,6 +293,8 @@ class Variant:
     late_column: bool = False
     coded: bool = False
     watched: bool = False
+    erases: bool = False
+    exchanges: bool = False
 
     @property
     def apart(self) -> tuple[str, ...]:
@@ -323,9 +337,11 @@ class Variant:
         files += self.family.codes
         files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
-        converter = ("compensator/converter.c",) * self.coded
-        watch = ("compensator/health.c",) * self.watched
-        return (*files, "compensator/drive.c", *own, "compensator/status.c", *converter, *watch)
+        held = {
+            "exchange": self.exchanges, "converter": self.coded, "health": self.watched, "degauss": self.erases
+        }
+        more = tuple(f"compensator/{name}.c" for name, there in held.items() if there)
+        return (*files, "compensator/drive.c", *own, "compensator/status.c", *more)
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
@@ -557,6 +573,11 @@ def kernel_pieces(family: Family, facts: frozenset[str] = frozenset()) -> list[P
     return _pieces(family.kernel_files, family.facts | facts)
 
 
+def guards(variant: Variant) -> str:
+    """Functions that keep the answers of a module with parameters from outside within their range."""
+    return chosen(_read("compensator/within.c"), variant.family.facts | variant.facts)
+
+
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
     """The kernel pieces that `pieces` need but a shared run time keeps private."""
     shared = {piece.name for piece in _pieces(family.kernels, family.facts)}
@@ -625,7 +646,10 @@ def piece_of(text: str) -> Piece:
 def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
     """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
     every = {piece.name: piece for piece in _pieces(["compensator/api.h"], ())}
-    more = [every[name] for name in (*CODED * variant.coded, *WATCHING * variant.watched)]
+    taken = (
+        *CODED * variant.coded, *WATCHING * variant.watched, *ERASING * variant.erases, *EXCHANGING * variant.exchanges
+    )
+    more = [every[name] for name in taken]
     return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *more]
 
 
@@ -633,7 +657,7 @@ def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     """Prototypes of an operator: those of every model, and those named in `more` of models with effects."""
     prefix = f"hystgen_{operator}_"
     every = _pieces(["compensator/api.h"], ())
-    usual = [piece for piece in every if piece.name.startswith(prefix) and piece.name not in CODED]
+    usual = [piece for piece in every if piece.name.startswith(prefix) and piece.name not in DRIVEN]
     chain = {prefix + each for each in more}
     return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 

@@ -48,6 +48,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "drive": schema.Converter,
     "health": schema.Health,
     "residual": schema.Residual,
+    "degauss": schema.Degaussing,
 }
 
 _PLACES: dict[str, type[BaseModel]] = {
@@ -272,6 +273,9 @@ class _Checker:
         if window is not None and window & (window - 1):
             near = 1 << (window.bit_length() - 1)
             self.add(("emit", "health", "window"), f"must be a power of 2, not {window}; give {near} or {2 * near}")
+        end = self.get("emit", "degauss", "end")
+        if ends is not None and end is not None and not ends[0] <= end <= ends[1]:
+            self.add(("emit", "degauss", "end"), f"{shown(end)} is outside input_range; give a drive inside it")
         if isinstance(self.at(("model", "pi")), Mapping):
             self._pi(("model", "pi"))
         stages = self.at(("model", "memoryless"))

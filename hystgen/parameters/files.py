@@ -148,8 +148,8 @@ def canonical_json(parameters: Parameters) -> str:
 
     A density appears as given, not as the plays made from it. `emit.output` is left out, since the C does not depend on
     its folder, and `recorded_at`, which changes nothing. Keys added later (`emit.optimize`, `emit.compensation`,
-    `emit.converter`, `emit.health`, `residual`, `not_separable` and some in effects) appear only if they differ from
-    the default, so that files without them keep their hash.
+    `emit.converter`, `emit.health`, `emit.degauss`, `residual`, `not_separable` and some in effects) appear only if
+    they differ from the default, so that files without them keep their hash.
     """
     data = _data(parameters)
     del data["emit"]["output"]
@@ -165,6 +165,8 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["health"]
     if parameters.residual is None:
         data.pop("residual", None)
+    if parameters.emit.degauss is None:
+        data["emit"].pop("degauss", None)
     if not parameters.not_separable:
         del data["not_separable"]
     del data["recorded_at"]

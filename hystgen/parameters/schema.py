@@ -311,6 +311,20 @@ class Residual(_Part):
     correlation: Positive = Field(description="time in s over which the error or its square stays correlated")
     samples: Annotated[float, Field(ge=1.0)] = Field(description="number of independent samples of the error")
 
+class Degaussing(_Part):
+    """The sequence of drives that erases the memory."""
+
+    end: Number | None = Field(
+        default=None, description="drive at its end, input units; default: that of the start memory", examples=[50.0]
+    )
+    within: Annotated[Positive, Field(lt=1)] | None = Field(
+        default=None, description="fraction of a step to which effects settle at its end; default: 0.01"
+    )
+    max_rate: Positive | None = Field(
+        default=None, description="fastest drive, input units per s; default: compensation.max_rate, or the range in "
+        "50 samples; never above a slew limit",
+    )
+
 
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
@@ -335,6 +349,9 @@ class EmitDefaults(_Part):
         default=None, description="converters of references and drives, for steps of the inverse from code to code"
     )
     health: Health = Field(default=Health(), description="bands of the watch that --health adds")
+    degauss: Degaussing | None = Field(
+        default=None, description="writes a generator of the drives that erase the memory; {} for the defaults"
+    )
 
 
 class Parameters(_Part):

@@ -46,6 +46,7 @@ def verify(
     optimize: str | None = None,
     allow_partial: bool = False,
     health: bool = False,
+    tables: str = "constant",
     progress: Callable[[str], None] = lambda _: None,
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
@@ -72,7 +73,9 @@ def verify(
     if target_length is not None:
         arguments.whole("target_length", target_length, "calls", 1)
     model = as_model(source)
-    options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial, health=health)
+    options = emit_options(
+        model, operator, arithmetic, engine, layout, optimize, allow_partial, health=health, tables=tables
+    )
     parameters = parameters_sha256(model.parameters)
     model = emitted_model(model, options)
     numbers = model.tables(options.arithmetic, options.engine, options.operator)

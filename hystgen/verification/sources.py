@@ -11,7 +11,7 @@ from types import MappingProxyType
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
 from hystgen.basics import writing
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
-from hystgen.emission import module, runtime
+from hystgen.emission import block, module, runtime
 from hystgen.emission.chain import settings
 from hystgen.emission.options import Options
 from hystgen.model import Model
@@ -53,14 +53,15 @@ def harness(
     coded: bool = False,
     columns: int = 0,
     watched: bool = False,
+    block: Sequence[str] = (),
 ) -> str:
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator;
     `coded`: whether the inverse steps from code to code; `columns`: number of those that are set; `watched`: whether
-    the error of the model is watched."""
+    the error of the model is watched; `block`: bytes of its parameters, if it loads them."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic, columns)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
-        chain=chain, coded=coded, watched=watched,
+        chain=chain, coded=coded, watched=watched, block=block,
         means=("int32_t", "int64_t") if arithmetic.fixed else (f"{name}_real_t",) * 2,
     )
 
@@ -96,9 +97,9 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    arithmetic = ARITHMETICS[options.arithmetic]
+    arithmetic, words = ARITHMETICS[options.arithmetic], block.words(emitted.parameters)
     columns = len(emitted.compensator.columns)
-    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, columns, watched)
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, columns, watched, words)
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded, watched)

@@ -28,6 +28,7 @@ class _Ageing(Effect):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact, from the distance that the drive has travelled"
     timed: ClassVar[bool] = False
+    forgets: ClassVar[bool] = False
 
     @classmethod
     def _candidate(cls, label: str, about: About) -> Candidate:
