@@ -603,7 +603,7 @@ def loader(made: Parameters) -> str:
             for leaf in real if leaf.kind == kind for row in found[leaf.place]
         ], False))
     ranges.append(("int64_t", [
-        [literal(int(row.least)), literal(int(row.most)), f"{row.length}u", str(_size(leaf)), f"{row.rises}u", literal(row.sum)]
+        [*(literal(int(x)) for x in row[:2]), f"{row.length}u", str(_size(leaf)), f"{row.rises}u", literal(row.sum)]
         for leaf in whole for row in found[leaf.place]
     ], True))
     fill = []

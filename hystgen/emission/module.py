@@ -11,8 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from hystgen.chain.static import StaticModel
-from hystgen.emission import block, chain, cost, interface, runtime, selftest
-from hystgen.emission.block import Parameters
+from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import ConstantTable, EmittedModel, Form, Glue, Macro, Names, Numbers, Writer
 from hystgen.emission.cost import Cost, Data
 from hystgen.emission.folding import PLAIN, Members
@@ -24,6 +23,7 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
+    from hystgen.emission.block import Parameters
     from hystgen.emission.snapshot import InstanceState
     from hystgen.model import Model
 
@@ -175,7 +175,7 @@ def composed(one: EmittedModel, sha256: str = "", room: Mapping[str, int] = Mapp
     used = _tables(written, names.name, members, [each.code for each in (*pieces, *kernels)])
     numbered, number_names = dict[str, tuple[Macro, str]](), set[str]()
     if one.options.tables == "runtime":
-        from hystgen.emission import snapshot
+        from hystgen.emission import block, snapshot
 
         own_numbers = snapshot.numbers(one)
         found = block.number_macros([*interface.limits(one), *numbers.macros, *own_numbers], family.kind == "fixed")
@@ -209,6 +209,8 @@ def composed(one: EmittedModel, sha256: str = "", room: Mapping[str, int] = Mapp
     made = None
     states_of: tuple[InstanceState, ...] = ()
     if one.options.tables == "runtime":
+        from hystgen.emission import block
+
         types = [*memory, *of_tables, *own_types]
         made = block.parameters(
             one, numbered, [*used.values()][::-1], types, [*pieces, *kernels], sha256, room
@@ -267,9 +269,9 @@ def implementation(one: EmittedModel, code: Code) -> str:
     )
     texts: tuple[str, ...] = (code.kernels, code.types, code.tables, code.operators)
     if code.parameters:
-        macros = "\n".join(code.macros)
-        from hystgen.emission import snapshot
+        from hystgen.emission import block, snapshot
 
+        macros = "\n".join(code.macros)
         texts = (
             code.kernels, macros, code.operators, block.loader(code.parameters), snapshot.functions(code.snapshots)
         )
@@ -323,7 +325,13 @@ def files(module: Module) -> dict[str, str]:
     name, options, family = one.names.name, one.options, one.family
     command = interface.command(one.model.parameters, options)
     whole = implementation(one, made)
-    numbered = block.number_macros(interface.limits(one), family.kind == "fixed")
+    stated, reasons, bytes_ = interface.limits(one), tuple[str, ...](), list[str]()
+    if made.parameters:
+        from hystgen.emission import block
+
+        numbered = block.number_macros(stated, family.kind == "fixed")
+        stated, reasons = [each for each in stated if each[0] not in numbered], block.REASONS
+        bytes_ = block.words(made.parameters)
     single, source = options.layout == "single-header", f"{name}.c"
     shared = options.layout == "shared-runtime"
 
@@ -334,8 +342,7 @@ def files(module: Module) -> dict[str, str]:
     found = {
         f"{name}.h": template(
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,
-            limits=[each for each in interface.limits(one) if not made.parameters or each[0] not in numbered],
-            reasons=block.REASONS,
+            limits=stated, reasons=reasons,
             banner=top(f"{name}.h", f"{WHAT[options.operator]} of {name}", details),
             build=runtime.verbatim(family.build, name, family, name),
             api=runtime.api(interface.documented(one, module.cost), name, one.names.rt, family),
@@ -359,7 +366,7 @@ def files(module: Module) -> dict[str, str]:
         file = f"{name}_selftest{ending}"
         text = template(
             f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows,
-            fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD, block=block.words(made.parameters),
+            fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD, block=bytes_,
         )
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"
