@@ -562,7 +562,8 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
     read = read_banner(text)
     assert read is not None
     assert " \\\n" in text[: text.index("Parameters:")]
-    assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
+    options = {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
+    assert read.options == {**options, "tables": "constant"}
     assert not read.edited
 
 

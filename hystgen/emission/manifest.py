@@ -134,7 +134,7 @@ def file(module: Module, files: Mapping[str, str]) -> dict[str, str]:
         description=parameters.description,
         generator=__version__,
         command=command,
-        options={key: str(getattr(one.options, key)) for key in OPTIONS},
+        options={key: str(getattr(one.options, key)) for key in OPTIONS if getattr(one.options, key) != "constant"},
         parameters_sha256=module.sha256,
         effects=tuple(effect.name for effect in parameters.model.effects),
         not_compensated=one.options.left_out,

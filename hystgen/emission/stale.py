@@ -211,6 +211,8 @@ def command(
     """The command that emits with these options and files of a user's own effects."""
     words = ["hystgen", "emit", *parameters, *(["-o", output] if output not in (None, ".") else [])]
     for key, value in options.items():
+        if (key, value) == ("tables", "constant"):
+            continue  # the default, which banners do not state either
         words.append(f"--{key.replace('_', '-')}")
         if isinstance(value, str):
             words.append(value)
