@@ -272,7 +272,7 @@ def _rested(made: Degauss, effects: list[Effect], within: float, seconds: float)
 
 
 @dataclass(frozen=True)
-class _Numbers:
+class _InArithmetic:
     """Drives of an arithmetic: `low`, `high`, and the distance `unit` of those used, so that sums of them are exact."""
 
     low: Any
@@ -296,17 +296,17 @@ class _Numbers:
         return type(self.low)(whole * self.unit)
 
 
-def _numbers(model: Model, arithmetic: str) -> _Numbers:
+def _numbers(model: Model, arithmetic: str) -> _InArithmetic:
     """The drives of an arithmetic. Raises FormatError."""
     about = ARITHMETICS[arithmetic]
     low, high = model.parameters.input_range
     if about.fixed:
         least, most = model.tables(arithmetic, model.engine(arithmetic=arithmetic)).limits.drive[0]
-        return _Numbers(int(least), int(most), 1.0, model.units_per_code(arithmetic)[0], arithmetic)
+        return _InArithmetic(int(least), int(most), 1.0, model.units_per_code(arithmetic)[0], arithmetic)
     kind = about.real
     ends: list[Any] = [kind(low), kind(high)]
     for end, (given, up) in enumerate(((low, 1), (high, -1))):  # inward
         if up * float(ends[end]) < up * given:
             ends[end] = np.nextafter(ends[end], kind(up * np.inf))
     unit = float(np.spacing(max(map(abs, ends))))
-    return _Numbers(ends[0], ends[1], unit, 1.0, arithmetic)
+    return _InArithmetic(ends[0], ends[1], unit, 1.0, arithmetic)

@@ -44,7 +44,7 @@ def made(one: Model, arithmetic: str, operator: str = "both", **options: str) ->
     return module.of(one, emit_options(one, operator, arithmetic, tables="runtime", **options))  # type: ignore[arg-type]
 
 
-def parameters(one: Model, arithmetic: str, operator: str = "both", **options: str) -> block.Parameters:
+def parameters(one: Model, arithmetic: str, operator: str = "both", **options: str) -> block.UnitParameters:
     found = made(one, arithmetic, operator, **options).parameters
     assert found is not None
     return found

@@ -25,7 +25,7 @@ from hystgen.basics.problems import RecordError
 from hystgen.identification.pi import IdentificationError
 from hystgen.records import Record
 from hystgen.service import change, monitoring, sessions
-from hystgen.service.sessions import Seen, Session
+from hystgen.service.sessions import Seen, ServiceSession
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -65,11 +65,11 @@ def written(folder: Path, records: Sequence[Record]) -> list[Path]:
     return paths
 
 
-def made(parts: np.ndarray, size: float = 1.0, sure: float = 1e-9) -> list[Session]:
+def made(parts: np.ndarray, size: float = 1.0, sure: float = 1e-9) -> list[ServiceSession]:
     """Sessions known by one direction alone, all with the same use of the drive."""
     use = np.array([0.0, 1.0, 0.0])
     return [
-        cast(Session, SimpleNamespace(name=f"s{k}", seen={"gain": Seen(size, float(x), sure)}, use=use, rms=0.0))
+        cast(ServiceSession, SimpleNamespace(name=f"s{k}", seen={"gain": Seen(size, float(x), sure)}, use=use, rms=0.0))
         for k, x in enumerate(parts)
     ]
 

@@ -14,8 +14,8 @@ from hystgen.basics import console
 from hystgen.basics.version import __version__
 
 COMMANDS = (
-    "emit", "verify", "blob", "build", "fmu", "simulate", "identify", "diagnose", "track", "compare", "monitor", "refine",
-    "show", "degauss", "schema",
+    "emit", "verify", "blob", "build", "fmu", "simulate", "degauss", "identify", "diagnose", "track", "compare",
+    "monitor", "refine", "show", "schema",
 )
 """The commands, each in a module of the same name."""
 

@@ -80,7 +80,7 @@ class Leaf:
 
 
 @dataclass(frozen=True)
-class Parameters:
+class UnitParameters:
     """The parameters of a module: the type in C (`declared`), its numbers, its pointers into itself (place and target),
     and `layout`: what has to agree between a module and a block, as text."""
 
@@ -131,7 +131,7 @@ def member(macro: str) -> str:
     return f"{name}_count" if name in ("yields", "pieces") else {"near": "near_by"}.get(name, name)
 
 
-def words(made: Parameters | None) -> list[str]:
+def words(made: UnitParameters | None) -> list[str]:
     """The bytes of a unit's block in C; none for constant tables."""
     return [f"0x{byte:02x}u" for byte in made.block()] if made else []
 
@@ -332,7 +332,7 @@ def capacity(pieces: int, wanted: int) -> int:
 def parameters(
     one: EmittedModel, macros: Mapping[str, tuple[Macro, str]], tables: Sequence[ConstantTable],
     pieces: Iterable[Piece], code: Sequence[Piece], sha256: str, wanted: Mapping[str, int] = MappingProxyType({}),
-) -> Parameters:
+) -> UnitParameters:
     """The parameters of a module with these numbers and tables; `pieces`: types; `code`: functions."""
     types, name = _Types(one, pieces), one.names.name
     lines, leaves, pointers = [], list[Leaf](), list[tuple[str, str]]()
@@ -385,7 +385,7 @@ def parameters(
     members = [f"{leaf.kind} {leaf.place} {leaf.sizes}" for leaf in leaves]
     said = [" ".join(piece.code.split()) for piece in code]
     layout = "\n".join([*members, *map(str, pointers), *said])
-    return Parameters(declared, tuple(leaves), tuple(pointers), layout, name, sha256, one.family.kind == "fixed")
+    return UnitParameters(declared, tuple(leaves), tuple(pointers), layout, name, sha256, one.family.kind == "fixed")
 
 
 def _targets(where: str, kind: str, words: Sequence[object], name: str) -> Iterator[tuple[str, str]]:
@@ -408,7 +408,7 @@ WIDER = {True: 16.0, False: 1.25}
 from, in floating point and in codes. In codes this is one bit, which sums of products have to spare."""
 
 
-class Row(NamedTuple):
+class NumberLimits(NamedTuple):
     """Limits of `length` numbers; `rises`: 1 if they must not fall; more for that many coefficients of each of several
     polynomials: the limits are those of the first of them, and the others may together be as large as `sum`."""
 
@@ -423,12 +423,12 @@ ABOVE = 255
 """`rises` of the upper end of a range, which comes right after the lower one."""
 
 
-def exact(x: float | int) -> Row:
+def exact(x: float | int) -> NumberLimits:
     """Only this number."""
-    return Row(x, x, 1, 0)
+    return NumberLimits(x, x, 1, 0)
 
 
-def rows(made: Parameters) -> Iterator[tuple[Leaf, list[Row]]]:
+def rows(made: UnitParameters) -> Iterator[tuple[Leaf, list[NumberLimits]]]:
     """The limits of the numbers of every leaf, for units like this one."""
     typical = {
         kind: max((abs(x) for leaf in made.leaves if leaf.kind == kind for x in leaf.values if not never(x, kind)),
@@ -440,7 +440,7 @@ def rows(made: Parameters) -> Iterator[tuple[Leaf, list[Row]]]:
     for leaf in made.leaves:
         if leaf.kind in REAL and made.fixed:
             continue
-        found = [Row(*own, count, 0) for own, count in _runs(leaf, typical, places, targets)]
+        found = [NumberLimits(*own, count, 0) for own, count in _runs(leaf, typical, places, targets)]
         member = re.split(r"[._]", leaf.name)[-1]
         if member == "step":
             found = [exact(x) for x in leaf.values]
@@ -457,7 +457,7 @@ def rows(made: Parameters) -> Iterator[tuple[Leaf, list[Row]]]:
             each = leaf.sizes[1]
             largest = max(_beyond_first(leaf.values, each))
             low, high = _box(leaf.values[::each], leaf.kind, typical[leaf.kind])
-            found = [Row(low, high, len(leaf.values), each, max(1, int(largest * WIDER[False])))]
+            found = [NumberLimits(low, high, len(leaf.values), each, max(1, int(largest * WIDER[False])))]
         yield leaf, found
 
 
@@ -538,7 +538,7 @@ def _small(
     return SCALES if member.endswith("scale") else (least, most)
 
 
-class Factor(NamedTuple):
+class FactorPlace(NamedTuple):
     """Limit of `length` factors, as a mantissa from 2^30 on and a shift; `mantissa` and `shift`: where the first ones
     are among the numbers of a block."""
 
@@ -549,7 +549,7 @@ class Factor(NamedTuple):
     most_shift: int
 
 
-def factors(made: Parameters) -> Iterator[Factor]:
+def factors(made: UnitParameters) -> Iterator[FactorPlace]:
     """The limits of all factors in fixed point, which have a mantissa and a shift."""
     places, at = {}, 0
     for leaf in (leaf for group in made.groups for leaf in group):
@@ -563,7 +563,7 @@ def factors(made: Parameters) -> Iterator[Factor]:
             shift = 0
             while largest * (1 << shift) < 1 << 30:
                 shift += 1
-            yield Factor(begin, shifts_at, len(leaf.values), min(int(largest * (1 << shift)), 2**31 - 1), shift)
+            yield FactorPlace(begin, shifts_at, len(leaf.values), min(int(largest * (1 << shift)), 2**31 - 1), shift)
 
 
 def _beyond_first(values: Sequence[float | int], each: int) -> Iterator[float | int]:
@@ -571,7 +571,7 @@ def _beyond_first(values: Sequence[float | int], each: int) -> Iterator[float | 
     return (sum(map(abs, values[i + 1 : i + each])) for i in range(0, len(values), each))
 
 
-def fits(leaf: Leaf, found: Sequence[Row], values: Sequence[float | int]) -> bool:
+def fits(leaf: Leaf, found: Sequence[NumberLimits], values: Sequence[float | int]) -> bool:
     """Whether numbers are within the limits of a leaf."""
     at = 0
     for row in found:
@@ -591,7 +591,7 @@ def _size(leaf: Leaf) -> int:
     return -size if leaf.kind in WIDEST else size
 
 
-def loader(made: Parameters) -> str:
+def loader(made: UnitParameters) -> str:
     """The C that loads a block."""
     real, whole = made.groups
     found = {leaf.place: own for leaf, own in rows(made)}

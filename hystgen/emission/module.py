@@ -23,7 +23,7 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
-    from hystgen.emission.block import Parameters
+    from hystgen.emission.block import UnitParameters
     from hystgen.emission.snapshot import InstanceState
     from hystgen.model import Model
 
@@ -110,7 +110,7 @@ class Code:
     plays: tuple[ConstantTable, ...]
     beside: tuple[ConstantTable, ...]
     data: Data
-    parameters: Parameters | None = None
+    parameters: UnitParameters | None = None
     snapshots: tuple[InstanceState, ...] = ()
 
     @property
@@ -126,7 +126,7 @@ def front(one: EmittedModel) -> str:
     return f"{whole}\n{one.glue.functions}" if one.glue else whole
 
 
-def parameters(model: Model, options: Options, sha256: str, room: Mapping[str, int]) -> Parameters:
+def parameters(model: Model, options: Options, sha256: str, room: Mapping[str, int]) -> UnitParameters:
     """The parameters of a model in a module that loads them; `room`: entries of tables in that module whose lengths
     follow from numbers. Raises FormatError."""
     found = composed(compensator(model, options), sha256, room).parameters
@@ -294,7 +294,7 @@ class Module:
     doubts: Sequence[str]
 
     @property
-    def parameters(self) -> Parameters | None:
+    def parameters(self) -> UnitParameters | None:
         """The parameters that it loads, if they are not constants."""
         return self.code.parameters
 

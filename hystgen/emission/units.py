@@ -13,7 +13,7 @@ from typing import Any
 from hystgen.basics import arguments, writing
 from hystgen.basics.problems import FormatError
 from hystgen.emission import block, module
-from hystgen.emission.block import HEAD, MAGIC, VERSION, Parameters
+from hystgen.emission.block import HEAD, MAGIC, VERSION, UnitParameters
 from hystgen.emission.calls import emit_options, emitted_model
 from hystgen.emission.options import read_banner
 from hystgen.model import Model, ModelSource, as_model
@@ -23,7 +23,7 @@ TAKEN = ("operator", "arithmetic", "engine")
 """Options of the module that a block has to share; a header states them."""
 
 
-def parameters(model: Model, header: str | os.PathLike[str] | None = None, **options: Any) -> Parameters:
+def parameters(model: Model, header: str | os.PathLike[str] | None = None, **options: Any) -> UnitParameters:
     """The parameters of a unit; `header`: that of the module that is to load them, whose options are used.
 
     Raises what `emit` raises, ValueError if `header` is not that of a module that loads parameters, and FormatError if
@@ -50,7 +50,7 @@ def parameters(model: Model, header: str | os.PathLike[str] | None = None, **opt
     return made
 
 
-def _outside(made: Parameters, text: str, source: Path) -> str:
+def _outside(made: UnitParameters, text: str, source: Path) -> str:
     """The first number that a module would refuse, and its limits; empty if there is none."""
     if source.is_file():
         text += source.read_text(encoding="utf-8", errors="replace")
@@ -77,7 +77,7 @@ def _room(text: str) -> dict[str, int]:
     return {name: int(lengths[1:].split("]")[0]) for name, lengths in shape.items() if lengths}
 
 
-def _misfit(made: Parameters, text: str, header: str) -> str:
+def _misfit(made: UnitParameters, text: str, header: str) -> str:
     """Why a unit does not fit a module."""
     found = re.search(r"typedef struct \{\n((?:(?!typedef).)*)\n\} \w+_parameters_t;", text, re.DOTALL)
     there, here = _shape(found[1] if found else ""), _shape(made.declared.partition("{\n")[2])
@@ -157,7 +157,7 @@ def show_blob(
     return found | {"numbers": numbers, "damage": f"numbers: {', '.join(wrong)} out of range" if wrong else ""}
 
 
-def _numbers(wanted: Parameters, data: bytes) -> Mapping[str, list[float | int]]:
+def _numbers(wanted: UnitParameters, data: bytes) -> Mapping[str, list[float | int]]:
     found, at = {}, 0
     for leaf in (leaf for group in wanted.groups for leaf in group):
         form = f"<{len(leaf.values)}{block.STORED[leaf.kind]}"

@@ -17,7 +17,7 @@ from hystgen.report.viewer import Viewed, Viewer
 from hystgen.service import monitoring
 from hystgen.service.change import amount
 from hystgen.service.monitoring import Monitoring
-from hystgen.service.sessions import DIRECTIONS, Session
+from hystgen.service.sessions import DIRECTIONS, ServiceSession
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -212,7 +212,7 @@ def _zoom(found: Monitoring) -> Viewer:
     units = found.model.parameters.units
     chosen = [*found.sessions[max(found.first - MOST_VIEWED // 2, 0) : found.first], *found.now[-(MOST_VIEWED // 2) :]]
 
-    def viewed(each: Session) -> Viewed:
+    def viewed(each: ServiceSession) -> Viewed:
         role = "held out" if each in found.now else "fit"
         return Viewed(each.name, role, each.item.run.t, each.item.run.v, each.item.y, {"model": each.expected})
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.parameters.schema import Residual
-from hystgen.service.sessions import DIRECTIONS, SHAPE, Session
+from hystgen.service.sessions import DIRECTIONS, SHAPE, ServiceSession
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def largest_residual(stated: Residual | None, false_alarms: float) -> float | No
     return float(stated.rms * math.sqrt(stated.samples / chi2.ppf(false_alarms, stated.samples)))
 
 
-def find(sessions: Sequence[Session], residual: float | None, false_alarms: float) -> list[Change]:
+def find(sessions: Sequence[ServiceSession], residual: float | None, false_alarms: float) -> list[Change]:
     """Possible changes, at most one per direction and comparison: those that are evidence at this rate first, the
     directions in the order of their effect on the motion and each with its earliest session first, then the others.
 
@@ -120,7 +120,7 @@ def find(sessions: Sequence[Session], residual: float | None, false_alarms: floa
     return sorted(final, key=place)
 
 
-def _columns(sessions: Sequence[Session], name: str) -> tuple[Array, Array, Array]:
+def _columns(sessions: Sequence[ServiceSession], name: str) -> tuple[Array, Array, Array]:
     """Sizes, parts and standard deviations of a direction over the sessions (K,)."""
     table = np.array([[s.seen[name].size, s.seen[name].part, s.seen[name].sure] for s in sessions])
     return table[:, 0], table[:, 1], table[:, 2]
@@ -136,7 +136,7 @@ def _between(size: Array, part: Array, sure: Array) -> float:
     return max(0.0, excess / weight) if weight > 0.0 else 0.0  # 0 if one session outweighs all others
 
 
-def _among(sessions: Sequence[Session], name: str, residual: float | None, rate: float) -> Change | None:
+def _among(sessions: Sequence[ServiceSession], name: str, residual: float | None, rate: float) -> Change | None:
     """The clearest change of a direction from one session to the next.
 
     The parts are a regression on the sizes whose slope changes once; their scatter is that between the sessions. The
@@ -184,7 +184,7 @@ def _among(sessions: Sequence[Session], name: str, residual: float | None, rate:
     return Change(name, k + 1, change, worth, spread, p, "earlier sessions", refused)
 
 
-def _follows_motion(sessions: Sequence[Session], rate: float) -> bool:
+def _follows_motion(sessions: Sequence[ServiceSession], rate: float) -> bool:
     """Whether the deviation of sessions follows the motion, rather than being noise, with error probability `rate`."""
     from scipy.stats import chi2
 
@@ -193,7 +193,7 @@ def _follows_motion(sessions: Sequence[Session], rate: float) -> bool:
     return bool(squares > chi2.ppf(1.0 - rate, sum(number for _, number, _ in found)))
 
 
-def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
+def _gap(before: Sequence[ServiceSession], after: Sequence[ServiceSession]) -> float:
     """How far apart two groups are in the use of the drive: 0 if they overlap, 1 for a whole drive range or a factor
     of e in speed."""
     one, other = np.array([s.use for s in before]), np.array([s.use for s in after])
@@ -203,7 +203,7 @@ def _gap(before: Sequence[Session], after: Sequence[Session]) -> float:
     return float(np.max(np.maximum(apart, 0.0) / scale))
 
 
-def _beyond(sessions: Sequence[Session], name: str, residual: float, rate: float) -> Change:
+def _beyond(sessions: Sequence[ServiceSession], name: str, residual: float, rate: float) -> Change:
     """The clearest change that exceeds what the model missed on the records it was fitted to.
 
     A healthy unit's model misses no more in service than `OTHER_MOTIONS` times the whole residual of identification,

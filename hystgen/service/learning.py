@@ -75,11 +75,11 @@ STRONG = 1e-6
 SCHEMA_ID = "urn:hystgen:refine:1"
 
 
-class _Entry(BaseModel):
+class _Written(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class PassEntry(_Entry):
+class PassEntry(_Written):
     """Repetitions of one reference: rms of wanted minus measured, of their mean and of a single one, and rms of what
     differs from repetition to repetition; output units."""
 
@@ -89,7 +89,7 @@ class PassEntry(_Entry):
     floor: float = Field(description="rms of the mean error that noise alone would leave")
 
 
-class ModelEntry(_Entry):
+class ModelEntry(_Written):
     """The refit of the model: rms error of a repetition that took no part in it."""
 
     accepted: bool
@@ -98,7 +98,7 @@ class ModelEntry(_Entry):
     why: str
 
 
-class CorrectionEntry(_Entry):
+class CorrectionEntry(_Written):
     """The learning filter L, and why it converges."""
 
     gamma: float = Field(description="largest |1 - L P| in the band, 95 % uncertainty of P included")
@@ -111,7 +111,7 @@ class CorrectionEntry(_Entry):
     change: float = Field(description="rms by which the correction moves the reference, output units")
 
 
-class Report(_Entry):
+class Learning(_Written):
     """What `hystgen refine --json` writes."""
 
     hystgen: Literal[1] = 1
@@ -126,7 +126,7 @@ class Report(_Entry):
 
 def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of the report."""
-    made = Report.model_json_schema(mode="serialization")
+    made = Learning.model_json_schema(mode="serialization")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID, **made}
 
 
@@ -171,7 +171,7 @@ class Learned:
     None where learning stops; `t`: its times in s; `error`: wanted minus mean motion
     of the last pass (N,), about its mean."""
 
-    report: Report
+    report: Learning
     t: Array = field(compare=False)
     error: Array = field(compare=False)
     refined: refining.Refined | None = field(default=None, compare=False)
@@ -514,7 +514,7 @@ def learned(
     if refined is not None:
         verdict, reference = "model_improved", None
         advice = ["Next: emit the compensator with the improved model, record again, and refine what is then left"]
-    report = Report(
+    report = Learning(
         verdict=verdict, unit=unit, passes=entries, model=entry, correction=correction,
         stop=reference is None and refined is None,
         advice=tuple(advice),

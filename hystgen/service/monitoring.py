@@ -28,7 +28,7 @@ from hystgen.model import Model, ModelSource, as_model
 from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.service import change, refining, sessions
 from hystgen.service.change import FEWEST, Change
-from hystgen.service.sessions import Session
+from hystgen.service.sessions import ServiceSession
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,7 +128,7 @@ class Monitoring:
     """
 
     model: Model
-    sessions: tuple[Session, ...]
+    sessions: tuple[ServiceSession, ...]
     changes: tuple[Change, ...]
     false_alarms: float
     residual: float | None
@@ -180,7 +180,7 @@ class Monitoring:
         return self.sessions[self.first].name if self.alarm else None
 
     @property
-    def now(self) -> tuple[Session, ...]:
+    def now(self) -> tuple[ServiceSession, ...]:
         """The sessions since the change; the last one without a change."""
         return self.sessions[self.first :]
 
@@ -317,7 +317,7 @@ def _pooled(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _tracking(group: Sequence[Session]) -> float | None:
+def _tracking(group: Sequence[ServiceSession]) -> float | None:
     found = [each.tracking for each in group if each.tracking is not None]
     return _pooled(found) if found else None
 
@@ -393,7 +393,7 @@ def _cause(
     from the beginning is not taken for the change.
     """
 
-    def diagnosed(model: Model, group: Sequence[Session]) -> Diagnosis | None:
+    def diagnosed(model: Model, group: Sequence[ServiceSession]) -> Diagnosis | None:
         try:
             records: list[Record] = [each.record for each in group]
             return diagnose(model, records, history=history, rest=rest, skip=skip, effects=effects)

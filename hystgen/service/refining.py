@@ -21,7 +21,7 @@ from hystgen.identification.quality import correlation_time
 from hystgen.model import Model
 from hystgen.parameters.files import dump_parameters, make_parameters
 from hystgen.parameters.schema import Parameters
-from hystgen.service.sessions import Session
+from hystgen.service.sessions import ServiceSession
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -189,7 +189,7 @@ class _Problem:
         return _Fit(at, spread, squares, noise)
 
 
-def refine(model: Model, sessions: Sequence[Session]) -> Refined:
+def refine(model: Model, sessions: Sequence[ServiceSession]) -> Refined:
     """The model with the parameters that the sessions show; the others stay.
 
     Weights and parameters of effects are fitted about their old values, with these as a prior: a parameter is shown if
@@ -212,7 +212,7 @@ def refine(model: Model, sessions: Sequence[Session]) -> Refined:
         raise IdentificationError("the model gives no finite output on these sessions") from None
 
 
-def _refined(model: Model, problem: _Problem, sessions: Sequence[Session]) -> Refined:
+def _refined(model: Model, problem: _Problem, sessions: Sequence[ServiceSession]) -> Refined:
     old, plays = problem.old, problem.plays
     able = problem.prior > 0.0
     whole = problem.solve(able)
@@ -239,7 +239,7 @@ def _refined(model: Model, problem: _Problem, sessions: Sequence[Session]) -> Re
     return Refined(parameters, tuple(numbers), before, after, tuple(_unshown(problem, shown, able, chosen is factor)))
 
 
-def _refusal(model: Model, sessions: Sequence[Session], what: str) -> str:
+def _refusal(model: Model, sessions: Sequence[ServiceSession], what: str) -> str:
     low, high = model.cascade.input_range
     span = max(float(np.ptp(each.item.run.v[each.known])) for each in sessions)
     return (

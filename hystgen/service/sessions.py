@@ -78,7 +78,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Session:
+class ServiceSession:
     """A session: N samples. `error`: measured minus expected, its offset removed, NaN where not compared;
     `tracking`: rms of measured minus reference, its offset removed, None without a reference."""
 
@@ -242,7 +242,7 @@ def in_order(records: Sequence[Record], sources: Sequence[Source]) -> tuple[list
 
 def compared(
     records: Sequence[Record], fitted: Fitted, history: tuple[float, ...] | None, rest: float, skip: float
-) -> tuple[list[Session], list[str]]:
+) -> tuple[list[ServiceSession], list[str]]:
     """The sessions that can be compared with a model, and notes on the others. Raises RecordError if there is none.
 
     Every session stands alone: its offset, and without a history its start memory, are its own.
@@ -266,7 +266,7 @@ def compared(
         except NotFiniteError:
             notes.append(f"{record.name} is left out: an effect of the model gives no finite output")
             continue
-        session = Session(record.name, record, item, error)
+        session = ServiceSession(record.name, record, item, error)
         if len(session.known) < FEWEST_SAMPLES:
             notes.append(
                 f"{record.name} is left out: only {len(session.known)} samples can be compared, since its start memory "
