@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 @click.argument("params", nargs=-1, type=click.Path(), callback=common.matched)
 @click.option("-o", "output", type=click.Path(), help="file to write, or with several PARAMS the folder of NAME.bin")
 @click.option("--show", "shown", type=click.Path(dir_okay=False), metavar="UNIT.bin",
-              help="print what a block contains; with PARAMS, also its numbers")  # fmt: skip
+              help="print what a block contains; with PARAMS, also its numbers")
 @click.option("--json", "as_json", is_flag=True, help="with --show: print JSON")
 @click.option("--module", "header", type=click.Path(dir_okay=False), metavar="NAME.h",
-              help="header of the module: takes its options and checks that the unit fits")  # fmt: skip
+              help="header of the module: takes its options and checks that the unit fits")
 @common.operator_option
 @common.arithmetic_option
 @common.engine_option
