@@ -248,7 +248,7 @@ BOUNDS = {
     "lines that ask `.fixed`": (26, 10),
     "lines with `Any`": (317, 300),
     "`fmt: skip`": (1, 30),
-    "tuples of numbered slots": (25, 0),
+    "tuples of numbered slots": (24, 0),
     "files that name an effect outside its folder": (2, 0),
     "class names in several files": (1, 0),
     "files of C": (98, 120),

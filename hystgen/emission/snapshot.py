@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from hystgen.emission.compensator import EmittedModel, Macro
 
 MAGIC, VERSION = b"HYSS", 1
-HEAD, TAIL = 20, 4
-"""[bytes] Magic, version, layout, size and CRC of the parameters; and the CRC at the end."""
+HEAD = 20
+"""[bytes] Magic, version, layout, size and CRC of the parameters."""
+TAIL = 4
+"""[bytes] The CRC at the end."""
 
 WIDTHS = {
     "int64_t": -8, "int32_t": -4, "int16_t": -2, "uint32_t": 4, "uint16_t": 2, "uint8_t": 1, "bool": 1,
