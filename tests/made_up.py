@@ -33,7 +33,7 @@ class Hypothesis:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
         self.shape, self.weights = np.zeros(len(names)), np.zeros(0)
-        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0), parts=(), front=None)
+        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0), parts=(), front=None, effects=lambda _: ())
         self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 
@@ -123,6 +123,7 @@ class Made:
             bounds=(np.full(2, -1.0), np.full(2, 1.0)),
             parts=(SimpleNamespace(candidate=amount, ordinary=amount, known=False),),
             front=None,
+            effects=lambda _: (),
             pieces=lambda shape: (np.empty(0), [shape]),
         )
         self.bare = True

@@ -36,7 +36,7 @@ from hystgen.diagnosis.data.signals import noise_floor
 from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
 from hystgen.diagnosis.findings.result import Result
-from hystgen.diagnosis.search import acceptance, fits, harm, hypothesis, screening, selection
+from hystgen.diagnosis.search import acceptance, fits, harm, hypothesis, screening, selection, shared
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Actuator, Structure
 from hystgen.diagnosis.search.screening import Option
@@ -353,6 +353,43 @@ def plays_of_a_fit() -> Any:
     return 25 <= len(prepare([one], [other], (0.0,), 0.0).thresholds) <= 40
 
 
+# What a column shares with time, mains and drive --------------------------------------------------------------
+
+
+def of_its_own(own: float, monkeypatch: pytest.MonkeyPatch) -> bool:
+    """Whether a column is named of which this share of the removed power belongs to it alone."""
+    best = trial(0.3)
+    monkeypatch.setattr(shared, "column_of", lambda _: "load")
+
+    def apart(items: Sequence[int], column: str, errors: Sequence[Sequence[Array]]) -> list[list[Array]]:
+        return [[(own * (1.0 - 0.3**2)) ** 0.5 * e for e in errors[0]], [0.0 * e for e in errors[1]]]
+
+    monkeypatch.setattr(shared, "apart", apart)
+    return selection.merit_of(UNNAMED, best, RECORDS) is not None
+
+
+def explained(error: Array, item: Item) -> bool:
+    """Whether time and drive alone explain an error."""
+    return bool(np.abs(shared._without(error, shared._shared(item, ()))).max() < 1e-6)
+
+
+def late(share: float) -> bool:
+    """Whether the drive through a lag of this share of the record is explained."""
+    item = sine(2000)
+    step = 1.0 / (share * (len(item.run.t) - 1))
+    held = np.exp(-step)
+    early, now = (1.0 - held) / step - held, 1.0 - (1.0 - held) / step  # the drive is straight between samples
+    v = item.run.v - item.run.v[0]
+    moved = np.append(0.0, early * v[:-1] + now * v[1:])
+    return explained(lfilter([1.0], [1.0, -held], moved), item)
+
+
+row("what_a_column_explains_alone", "OWN_SHARE", {0.1: True, 0.06: False}, of_its_own)
+row("a_drift_is_shared_by_any_column", "SHARED_DEGREE", {5: True, 8: False}, lambda degree: explained(
+    np.polynomial.legendre.Legendre.basis(degree)(np.linspace(-1.0, 1.0, 2000)), sine(2000)))
+row("a_late_drive_is_shared_by_any_column", "SHARED_LAGS", {0.02: True, 0.05: False}, late)
+
+
 # Held-out records and effects of a given model ---------------------------------------------------------------
 
 
@@ -361,7 +398,7 @@ def creeps(*times: float, weight: float = 0.02) -> ExponentialCreep:
 
 
 def near(effect: Effect) -> Any:
-    return hypothesis._near(effect)
+    return hypothesis.near(effect)
 
 
 def largest(effect: Effect, weight: float) -> Any:

@@ -71,7 +71,8 @@ def differing(name: str, arithmetic: str, folder: Path, length: int, layout: str
     compensator, number = whole.compensator, ARITHMETICS[arithmetic]
     written.harness.write_text(
         sources.harness(
-            one.name, options.operators, compensator.calls, number, compensator.variant.coded, block.words(own)
+            one.name, options.operators, compensator.calls, number, compensator.variant.coded,
+            len(compensator.columns), block=block.words(own),
         )
     )
     numbers = unit.tables(arithmetic, options.engine, operator)
@@ -276,7 +277,8 @@ def test_no_block_can_fault_the_loader(name: str, arithmetic: str, machine: str,
         (tmp_path / file).write_text(text)
     (tmp_path / "main.c").write_text(EVA.format(name=name, NAME=name.upper()))
     text = (tmp_path / f"{name}.c").read_text()
-    functions = [f"{name}_{what}" for what in ("fits", "float_fit", "wholes_fit", "factors_fit", "fill", "bytes")]
+    looping = ("fits", "float_fit", "wholes_fit", "factors_fit", "described", "fill", "bytes")
+    functions = [f"{name}_{what}" for what in looping]
     visits = ",".join(f"{function}:5000" for function in functions if f"{function}(" in text)
     done = subprocess.run(
         [frama_c(), *MACHINES[machine], "-warn-signed-downcast", "-warn-special-float", "none", "-eva",

@@ -14,7 +14,7 @@ static void hystgen_course_init(const hystgen_course_table_t *t, hystgen_course_
     self->now = 0;
     self->seen = 0;
     self->begun = false;
-    for (i = 0; state != NULL && i < t->n; ++i) {
+    for (i = 0; i < t->n; ++i) {
         state[i].at = 0;
     }
 }
@@ -27,7 +27,7 @@ static hystgen_signal_t hystgen_course_bent(const hystgen_course_table_t *t,
     hystgen_signal_t total = t->square + hystgen_gain_times(t->cube, share);
     unsigned int i;
     total = hystgen_gain_times(hystgen_gain_times(total, share), share);
-    for (i = 0; state != NULL && i < t->n; ++i) {
+    for (i = 0; i < t->n; ++i) {
         const hystgen_signal_t low = above - t->play[i].threshold;
         const hystgen_signal_t high = above + t->play[i].threshold;
         if (state[i].at < low) {
