@@ -33,7 +33,8 @@ class Hypothesis:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
         self.shape, self.weights = np.zeros(len(names)), np.zeros(0)
-        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0), parts=(), front=None, effects=lambda _: ())
+        ends = self.shape - 1.0, self.shape + 1.0
+        self.structure = SimpleNamespace(bounds=ends, parts=(), front=None, effects=lambda _: ())
         self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 

@@ -361,7 +361,7 @@ def of_its_own(own: float, monkeypatch: pytest.MonkeyPatch) -> bool:
     best = trial(0.3)
     monkeypatch.setattr(shared, "column_of", lambda _: "load")
 
-    def apart(items: Sequence[int], column: str, errors: Sequence[Sequence[Array]]) -> list[list[Array]]:
+    def apart(_: Any, __: str, errors: Sequence[Sequence[Array]]) -> list[list[Array]]:
         return [[(own * (1.0 - 0.3**2)) ** 0.5 * e for e in errors[0]], [0.0 * e for e in errors[1]]]
 
     monkeypatch.setattr(shared, "apart", apart)

@@ -19,9 +19,9 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied);
 /* One sample from code to code. Commits the drive that the returned code makes. Cannot fail. */
 int32_t hystgen_inverse_step_code(hystgen_inverse_t *self, int32_t code);
 #endif
-/* Change of the drive that other parameters make for the displacement expected now. With `take` they
-   replace those of the instance, and the memory is carried over: each play stays as near to where
-   it is as the one before it allows, and states of effects go on. */
+/* Change of the drive that other parameters make for the displacement expected now. With `take`
+   they replace those of the instance, and the memory is carried over: each play stays as near to
+   where it is as the one before it allows, and states of effects go on. */
 hystgen_real_t hystgen_inverse_exchange(hystgen_inverse_t *self, const hystgen_parameters_t *next,
                                         bool take);
 /* The reference that a code of the reference's converter stands for. */

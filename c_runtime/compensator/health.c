@@ -20,8 +20,8 @@ void hystgen_health_init(hystgen_health_t *self) {
 unsigned int hystgen_health_update(hystgen_health_t *self, hystgen_real_t expected,
                                    hystgen_real_t measured) {
 #ifdef HYSTGEN_FIXED
-    const int32_t error = (int32_t)(measured >> HYSTGEN_HEALTH_HALVED) -
-                          (int32_t)(expected >> HYSTGEN_HEALTH_HALVED);
+    const int32_t error =
+        (int32_t)(measured >> HYSTGEN_HEALTH_HALVED) - (int32_t)(expected >> HYSTGEN_HEALTH_HALVED);
     const int32_t part = error >> HYSTGEN_HEALTH_SHIFT;
     const int64_t sum = self->sum + error;
     const int64_t squares = self->squares + (int64_t)part * part;

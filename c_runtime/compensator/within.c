@@ -1,5 +1,5 @@
-/* Answers of a module that loads its parameters, whatever the numbers in its block. Called by the steps
-   of its operators. */
+/* Answers of a module that loads its parameters, whatever the numbers in its block. Called by the
+   steps of its operators. */
 #ifndef HYSTGEN_WITHIN_C
 #define HYSTGEN_WITHIN_C
 #include "compensator/model.h"

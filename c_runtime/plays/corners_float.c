@@ -103,7 +103,7 @@ HYSTGEN_APART bool hystgen_move_or_stop(const hystgen_curve_t *t, hystgen_plays_
     hystgen_real_t begin = cap;
     hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
-    bool limits = stop;  /* the plays may stop in this block */
+    bool limits = stop; /* the plays may stop in this block */
 #ifdef HYSTGEN_HAS_PARAMETERS
     k = k < c->top ? k : c->top - 1u; /* whatever the numbers of a block */
 #endif
