@@ -187,7 +187,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(f"#define {fact}" for fact in sorted(one.variant.facts | _kernel_facts(one))),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {one.corners}",
-            *interface.limits(one),
+            *interface.defined(one, interface.limits(one)),
             *interface.status(one),
             *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in one.numbers.macros),
             *(f'#include "{header}"' for header in _states(one)),
