@@ -594,7 +594,7 @@ REFUSED = [
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
         '5:83: emit.x: unknown key; valid here: output, operator, arithmetic, engine, optimize, drive_lsb, '
-        'output_lsb, compensation, converter, health',
+        'output_lsb, compensation, converter, health, degauss',
     ]),
     case('emit_output', H + M + "emit: {output: 3}\n", [
         '5:16: emit.output: must be text, not 3; put it in quotes',

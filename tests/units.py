@@ -163,13 +163,15 @@ def _blocks(one: EmittedModel) -> list[str]:
     return [file for file in one.family.chain_blocks if not file.startswith(left_out)]
 
 
-def _included(file: str, facts: frozenset[str]) -> list[str]:
-    """Lines that put a file into a unit; a file for either operator appears in the form of each, as in emission."""
+def _included(file: str, facts: frozenset[str], absent: frozenset[str] = frozenset()) -> list[str]:
+    """Lines that put a file into a unit; a file for either operator appears in the form of each, as in emission, and
+    without the functions that are absent."""
     text = ((EFFECTS.parent if file.startswith("effects/") else RUNTIME) / file).read_text(encoding="utf-8")
     forms = runtime.forms(text, facts)
     if len(forms) == 1:
         return [f'#include "{file}"']
-    return list({piece.name: piece.text for form in forms for piece in runtime.split_pieces(form)}.values())
+    pieces = {piece.name: piece.text for form in forms for piece in runtime.split_pieces(form)}
+    return [text for name, text in pieces.items() if name not in absent]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
@@ -179,6 +181,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     facts = one.family.facts | one.variant.facts | _kernel_facts(one)
     types = [state.text for state in one.glue.states.values()] if one.glue else []
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
+    absent = runtime.DRIVEN - {*runtime.own_calls(one.variant)}
     text = "\n".join(
         [
             "#define HYSTGEN_CONFIGURED",
@@ -192,7 +195,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in one.numbers.macros),
             *(f'#include "{header}"' for header in _states(one)),
             *types,
-            *(line for header in api for line in _included(header, facts)),
+            *(line for header in api for line in _included(header, facts, absent)),
             *(f'#include "{file}"' for file in one.family.kernel_files),
             *(table.text for table in (*one.numbers.plays, *one.numbers.beside)),
             *(f'#include "{file}"' for file in _blocks(one)),

@@ -643,13 +643,17 @@ def piece_of(text: str) -> Piece:
     return Piece(own, text, frozenset(_NAME.findall(code)) - {own}, tuple(members))
 
 
+def own_calls(variant: Variant) -> tuple[str, ...]:
+    """The calls of `DRIVEN` that a model has."""
+    return (
+        *CODED * variant.coded, *WATCHING * variant.watched, *ERASING * variant.erases, *EXCHANGING * variant.exchanges
+    )
+
+
 def prototypes_of(variant: Variant, operators: Iterable[str], calls: Mapping[str, Iterable[str]]) -> list[Piece]:
     """Prototypes of a model's functions for users; `calls`: additional ones by operator."""
     every = {piece.name: piece for piece in _pieces(["compensator/api.h"], ())}
-    taken = (
-        *CODED * variant.coded, *WATCHING * variant.watched, *ERASING * variant.erases, *EXCHANGING * variant.exchanges
-    )
-    more = [every[name] for name in taken]
+    more = [every[name] for name in own_calls(variant)]
     return [*(piece for op in operators for piece in _calls(op, calls.get(op, ()))), *more]
 
 
