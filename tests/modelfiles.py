@@ -146,3 +146,17 @@ CODED = {
     "coding: twos-complement}, drive: {bits: 8, range: [-5, 5.1], coding: offset-binary}}}\n"
 }
 """A model whose references come from a converter and whose drives go to one."""
+
+PUSHED = chain(
+    "pushed",
+    "name: influence, column: load, offset: 0.05, gain: -0.01, reference: 2, time_constant: 0.02, range: [-10, 20]",
+    "name: influence, column: v_y, offset: 0.03, curve: [0.001, -0.0002], reference: 0, range: [-5, 5],"
+    " plays: {thresholds: [1, 2], weights: [0.02, 0.01]}",
+)
+"""Two columns, one behind a lag, one along a curve and with plays."""
+
+SERVED = {
+    name: head(name, -6, 5) + PLAYS + rest + "sample_time: 1.0e-3\nemit: {health: {window: 64, band: 0.5}, degauss: {}}\n"
+    for name, rest in (("served", ""), ("served_bent", TANH))
+}
+"""Models whose error is watched and whose memory can be erased."""

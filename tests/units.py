@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from modelfiles import BRAKED, CALM, CHAINS, LED, STEADY
+from modelfiles import BRAKED, CALM, CHAINS, LED, PUSHED, SERVED, STEADY
 from mutants import MODELS
 
-from hystgen.emission import interface, module, runtime
+from hystgen.emission import degauss, interface, module, runtime
 from hystgen.emission.compensator import EmittedModel
 from hystgen.emission.options import Options
 from hystgen.model import Model
@@ -70,6 +70,12 @@ ANALYSED = (
     ("sloping", "q31", "loop"),
     ("coded", "float32", "corners"),
     ("coded", "q31", "corners"),
+    ("pushed", "float32", "loop"),
+    ("pushed", "q15", "loop"),
+    ("served", "float32", "loop"),
+    ("served", "q31", "loop"),
+    ("served_bent", "float32", "corners"),
+    ("served_bent", "q15", "corners"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""
@@ -101,9 +107,13 @@ UNITS = (
 """Also every effect by itself, in floating point and in fixed point."""
 
 
+GUARDS = ("compensator/within.c",)
+"""Functions that emission calls in the steps of a module that loads its parameters."""
+
+
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    text = {**MODELS, **CHAINS, **LED, "calm": CALM, "braked": BRAKED, "steady": STEADY}[name]
+    text = {**MODELS, **CHAINS, **LED, "calm": CALM, "braked": BRAKED, "steady": STEADY, "pushed": PUSHED, **SERVED}[name]
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
@@ -121,7 +131,8 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
     """The files that a unit is made of, each with the numbers of the lines that are compiled for its model."""
     one = _compensator(name, arithmetic, engine)
     found = set()
-    for file in {*one.variant.sources(), *one.family.kernel_files, *_states(one), *_blocks(one)}:
+    guards = GUARDS * (name in SERVED)
+    for file in {*one.variant.sources(), *one.family.kernel_files, *_states(one), *_blocks(one), *guards}:
         folder = EFFECTS.parent if file.startswith("effects/") else RUNTIME
         text = (folder / file).read_text(encoding="utf-8").splitlines()
         numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
@@ -133,9 +144,15 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
 
 
 def _compensator(name: str, arithmetic: str, engine: str) -> EmittedModel:
-    """With the types that models share, from which nothing is left out."""
-    one = model(name)
-    return module.compensator(one, Options("both", arithmetic, engine, "shared-runtime"))
+    """With the types that models share, from which nothing is left out; models in service have all that service
+    needs, with constant numbers: emission hands those of a unit through."""
+    one, served = model(name), name in SERVED
+    return module.compensator(
+        one,
+        Options(
+            "both", arithmetic, engine, "shared-runtime", health=served, tables="runtime" if served else "constant"
+        ),
+    )
 
 
 def _kernel_facts(one: EmittedModel) -> frozenset[str]:
@@ -180,6 +197,11 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     chain, loop = one.variant.chain, one.family.loop
     facts = one.family.facts | one.variant.facts | _kernel_facts(one)
     types = [state.text for state in one.glue.states.values()] if one.glue else []
+    if name in SERVED:
+        types += [
+            '#include "compensator/health.h"', degauss.instance().text,
+            "typedef struct {\n    int unit;\n} hystgen_parameters_t;",
+        ]
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     absent = runtime.DRIVEN - {*runtime.own_calls(one.variant)}
     text = "\n".join(
@@ -200,7 +222,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(table.text for table in (*one.numbers.plays, *one.numbers.beside)),
             *(f'#include "{file}"' for file in _blocks(one)),
             module.front(one),
-            *(line for file in one.variant.sources() for line in _included(file, facts)),
+            *(line for file in (*one.variant.sources(), *GUARDS * (name in SERVED)) for line in _included(file, facts)),
         ]
     )
     own = text.replace(f"{one.names.rt}_", "hystgen_").replace(f"{one.names.RT}_", "HYSTGEN_")

@@ -3,7 +3,9 @@
 #ifndef HYSTGEN_EXCHANGE_C
 #define HYSTGEN_EXCHANGE_C
 #include "compensator/chain/model.h"
+#ifndef HYSTGEN_CONFIGURED
 #include "compensator/chain/chain_calls.c"
+#endif
 
 /* Byte by byte: for a whole structure a compiler may call memcpy. */
 HYSTGEN_APART void hystgen_inverse_copy(hystgen_inverse_t *self, const hystgen_inverse_t *from) {

@@ -82,6 +82,12 @@ extern const hystgen_start_t hystgen_operator_start[2];
 #define HYSTGEN_CODE_STEP 1
 #define HYSTGEN_CODE_STEP_BITS 1u
 
+/* The numbers of a unit, of a module that loads them. */
+typedef struct {
+    hystgen_real_t drive_min;
+    hystgen_real_t drive_max;
+} hystgen_parameters_t;
+
 #define HYSTGEN_DEGAUSS_TURN_COUNT 3u
 typedef struct {
     hystgen_real_t drive;
