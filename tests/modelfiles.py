@@ -155,8 +155,9 @@ PUSHED = chain(
 )
 """Two columns, one behind a lag, one along a curve and with plays."""
 
+SERVICE = "sample_time: 1.0e-3\nemit: {health: {window: 64, band: 0.5}, degauss: {}}\n"
 SERVED = {
-    name: head(name, -6, 5) + PLAYS + rest + "sample_time: 1.0e-3\nemit: {health: {window: 64, band: 0.5}, degauss: {}}\n"
+    name: head(name, -6, 5) + PLAYS + rest + SERVICE
     for name, rest in (("served", ""), ("served_bent", TANH))
 }
 """Models whose error is watched and whose memory can be erased."""

@@ -113,7 +113,8 @@ GUARDS = ("compensator/within.c",)
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    text = {**MODELS, **CHAINS, **LED, "calm": CALM, "braked": BRAKED, "steady": STEADY, "pushed": PUSHED, **SERVED}[name]
+    more = {"calm": CALM, "braked": BRAKED, "steady": STEADY, "pushed": PUSHED}
+    text = {**MODELS, **CHAINS, **LED, **SERVED, **more}[name]
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
