@@ -378,11 +378,11 @@ class Parameters(_Part):
     input_range: tuple[Number, Number] = Field(
         description="lowest and highest drive the actuator may see, input units", examples=[[0.0, 100.0]]
     )
-    model: ModelParameters = Field(description="what the actuator does")
-    emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
     residual: Residual | None = Field(
         default=None, description="error that identification left, with which monitor and --health compare later ones"
     )
+    model: ModelParameters = Field(description="what the actuator does")
+    emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
     not_separable: tuple[tuple[str, str], ...] = Field(
         default=(), description="pairs of an effect that a diagnosis named and one that the records leave possible"
     )
