@@ -142,7 +142,8 @@ class ParameterKeys(Generated):
         "Units": "units", "ModelParameters": "model", "PIParameters": "pi", "DensityParameters": "density",
         "DensityTable": "table", "DeadZoneParameters": "dead_zone", "TanhParameters": "tanh",
         "TanhBranch": "branch", "EmitDefaults": "emit", "Compensation": "compensation",
-        "Converters": "converter", "Converter": "reference and drive",
+        "Converters": "converter", "Converter": "reference and drive", "Health": "health", "Degaussing": "degauss",
+        "Residual": "residual",
     }  # fmt: skip
 
     def lines(self) -> Iterator[str]:

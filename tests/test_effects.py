@@ -328,7 +328,7 @@ def test_candidates_without_plays_or_temperature_are_left_out() -> None:
     assert not effects.shapes("thermal")[0].candidates(about)
 
 
-positive = st.floats(0, 1e30, exclude_min=True)
+positive = st.floats(1e-30, 1e30)
 times = st.floats(0, 1e30)
 share = st.floats(-1e30, 1e30)
 VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
@@ -412,7 +412,7 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     )
     | st.builds(
         lambda k, d, t: {"shape": "duhem", "weights": (k,), "widths": (d,), "tilts": (t / d,)},
-        share, positive, st.floats(-1, 1),
+        share, positive.filter(lambda d: d > 1e-29), st.floats(-1, 1),  # a tilt is at most 1e30
     ),
 }  # fmt: skip
 
@@ -989,6 +989,7 @@ def test_order_of_the_chain_is_not_that_of_the_file() -> None:
         "resonance", "saturation", "sensor_nonlinearity", "drift",
     ]  # fmt: skip
     first = {effect.name: effect for effect in reversed(EVERY)}
+    del first["influence"]  # it and `thermal` act in the order of the file
     listed = list(first.values())
     for _ in range(20):
         rng.shuffle(listed)  # type: ignore[arg-type]
