@@ -342,7 +342,8 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     "rate_dependence": st.one_of(
         st.builds(lambda b: {"betas": (b, 0.0, b)}, times),
         st.builds(
-            lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m}, times, st.floats(0.1, 10.0)
+            lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m},
+            st.floats(1e-15, 1e15), st.floats(0.1, 10.0),
         ),
     ),
     "influence": st.builds(
