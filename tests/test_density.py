@@ -406,6 +406,7 @@ def test_powers_beyond_every_number_are_refused(text: str) -> None:
         parse_formula(text)(1.0)
 
 
+@pytest.mark.slow
 def test_any_tolerance_takes_seconds() -> None:
     density = from_formula(parse_formula("sqrt((r-3.333)**2)"), 10.0)
     finest = density.discretise(0.7, 4096).error
@@ -514,7 +515,7 @@ def test_some_history_reaches_the_bound_of_the_output(gaps: list[float], p: list
     assert abs(gap - plays.output_error) <= output_rounding(plays, r, p, v)
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(st.lists(st.floats(0.0, 2.0), min_size=3, max_size=3), st.floats(0.1, 3.0), st.floats(0.5, 20.0), st.integers(1, 20))
 def test_random_formulas_against_the_exact_loading_curve(c: list[float], b: float, end: float, n: int) -> None:
     """The density `a0 + a1 exp(-b r) + a2 r**2` is integrated twice by hand."""

@@ -56,8 +56,8 @@ from hystgen.report import diagnosis as report
 Array = NDArray[np.float64]
 Call = Callable[..., tuple[int, str, str]]
 
-SINGLES = 13
-"""Number of seeds of the tuning block: one for each single effect of the catalogue."""
+SINGLES = 13 if os.environ.get("HYSTGEN_WHOLE") else 6
+"""Number of seeds of the tuning block: one for each single effect of the catalogue, or six of them."""
 
 NONE = 6
 
@@ -230,6 +230,7 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
 
 
+@pytest.mark.slow
 @pytest.mark.data
 def test_flexure_stage_with_more_records(measured: Path, tmp_path: Path) -> None:
     """The larger loops show a non-congruence that hardly shows at the end of the fades; it is still named."""
@@ -398,6 +399,7 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
     assert preparing.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
+@pytest.mark.slow
 def test_start_memories_of_held_out_records_are_found_where_all_together_need_them() -> None:
     """A start memory found by a model without the effects contains part of them and would distort the comparison, so
     held-out records get one only if all together need it. A fit needs each of its records."""
@@ -1349,6 +1351,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
     assert preparing.with_ends(more) is None
 
 
+@pytest.mark.slow
 @pytest.mark.thorough
 def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
     """Another axis moves slowly during the fitted records, but not during the held-out one, which hardly moves."""
