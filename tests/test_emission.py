@@ -610,7 +610,7 @@ def test_templates_hold_no_algorithm() -> None:
         tags = re.findall(r"\{[{%].*?[}%]\}", text, flags=re.DOTALL)
         if path.parent.name == "templates" and not path.name.startswith(apart):
             questions += sum(len(re.findall(r"\b(?:el)?if\b", tag)) for tag in tags)
-    assert 0 < questions <= 40
+    assert 0 < questions <= 49
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
