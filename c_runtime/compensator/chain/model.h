@@ -133,6 +133,11 @@ hystgen_signal_t hystgen_inverse_undisplaced(hystgen_inverse_t *self, hystgen_si
                                              bool *limited);
 hystgen_signal_t hystgen_inverse_ahead(hystgen_inverse_t *self, hystgen_signal_t y);
 void hystgen_inverse_repeat(hystgen_inverse_t *self);
+/* The inverse's copies of functions of either operator, which an exchange of parameters calls. */
+hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v);
+hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self);
+hystgen_real_t hystgen_inverse_shown(const hystgen_inverse_t *self);
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u);
 /* Settings from outside, and the state that depends on the travel of the drive. */
 void hystgen_operator_settings_init(hystgen_operator_t *self);
 void hystgen_operator_travelled(hystgen_operator_t *self, hystgen_real_t v);
