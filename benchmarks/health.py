@@ -22,9 +22,16 @@ from hystgen.compensator.health import MODEL_LEFT, Band, FloatWatch
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
-SECONDS, SAMPLES, WINDOW = 1e-3, 12000, 2048
+SECONDS = 1e-3
+"""[s] Sample time."""
+SAMPLES = 12000
+"""[samples] Length of a session: four windows beside the one that gives the zero of the sensor."""
+WINDOW = 2048
+"""[samples] A window with about 100 independent means of the most coloured noise (0.9: 19 samples each)."""
 PROBABILITIES = (0.1, 0.01, 1e-3)
+"""Stated probabilities of a false alarm: those that 1200 windows can show."""
 CHANGES = (0.002, 0.005, 0.01, 0.02, 0.05)
+"""[fraction of the gain] Changes to be detected, from none detected to nearly all."""
 
 
 def stage(seed: int) -> Stage:

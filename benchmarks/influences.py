@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 RATE = 400.0
-"""[Hz] Sample rate."""
+"""[Hz] Sample rate; lines of the mains at 50 Hz have eight samples a period."""
 
 SAMPLES = 1600
-"""[samples] Length of a record."""
+"""[samples] Length of a record: 4 s. It decides nothing; longer records take longer to search."""
 
 NOISE = 5e-4
 """rms noise of the output, as a fraction of its range."""

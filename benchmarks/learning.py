@@ -20,7 +20,12 @@ from benchmarks.relays import Array, Stage, multisine
 from hystgen.model import Model
 from hystgen.service.learning import Learned
 
-SECONDS, SAMPLES, PASSES = 1e-3, 6000, 5
+SECONDS = 1e-3
+"""[s] Sample time."""
+SAMPLES = 6000
+"""[samples] Length of the records for identification."""
+PASSES = 5
+"""Passes with a corrected reference, the number within which the error has to fall."""
 
 
 def stage(seed: int) -> Stage:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -149,6 +150,5 @@ def test_a_single_repetition_is_refused() -> None:
 
 
 def test_the_json_follows_its_schema() -> None:
-    jsonschema = pytest.importorskip("jsonschema")
     found = hystgen.refine(model(), repetitions(lambda u: 0.9 * u), refit=False)
     jsonschema.validate(json.loads(found.to_json()), learning.schema())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
-class Presented:
+class Presented(ABC):
     """A result with its `page` and its picture (`draw`); `FILES`: names of the JSON, the page and the picture."""
 
     page: Callable[[], str] | None = field(default=None, compare=False)
@@ -23,9 +24,9 @@ class Presented:
 
     FILES: ClassVar[tuple[str, str, str]]
 
+    @abstractmethod
     def to_json(self) -> str:
         """The result for programs."""
-        raise NotImplementedError
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """The picture; also saved to `path`, a .png or .svg file, if given.
