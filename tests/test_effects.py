@@ -328,7 +328,7 @@ def test_candidates_without_plays_or_temperature_are_left_out() -> None:
     assert not effects.shapes("thermal")[0].candidates(about)
 
 
-positive = st.floats(1e-30, 1e30)
+positive = st.floats(0, 1e30, exclude_min=True)
 times = st.floats(0, 1e30)
 share = st.floats(-1e30, 1e30)
 VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
@@ -343,7 +343,7 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
         st.builds(lambda b: {"betas": (b, 0.0, b)}, times),
         st.builds(
             lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m},
-            st.floats(1e-15, 1e15), st.floats(0.1, 10.0),
+            times, st.floats(0.1, 10.0),
         ),
     ),
     "influence": st.builds(
@@ -413,8 +413,8 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     )
     | st.builds(
         lambda k, d, t: {"shape": "duhem", "weights": (k,), "widths": (d,), "tilts": (t / d,)},
-        share, positive.filter(lambda d: d > 1e-29), st.floats(-1, 1),  # a tilt is at most 1e30
-    ),
+        share, positive, st.floats(-1, 1),
+    ).filter(lambda keys: abs(keys["tilts"][0]) <= 1e30),
 }  # fmt: skip
 
 

@@ -139,7 +139,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
                 break
             fall = scale / tau * (e / scale) ** exponent
             continue
-        if not e > 0.0:
+        if not fall < 1e200 * e * e:  # relaxes at once, to almost nothing
             return 0.0, left if speed < 0.0 else 0.0
         slope = exponent * fall / e
         step = min(step, left)
