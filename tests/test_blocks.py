@@ -216,8 +216,8 @@ def fuzzed(name: str, arithmetic: str, folder: Path, blocks: int, seed: int = 1)
     )
     (folder / "fuzz.c").write_text(
         template.render(
-            name=name, block=block.words(one), real=one.real, fixed=one.fixed, head=block.HEAD.size,
-            described=sum(len(each.stored) for each in one.groups[0]) if one.fixed else 0, operators=operators,
+            name=name, block=block.words(one), real=one.real, fixed=not one.real, head=block.HEAD.size,
+            described=sum(len(each.stored) for each in one.groups[0] if each.described), operators=operators,
             ends={"inverse": "output", "forward": "drive"},
             settings={op: [each for each in settings if each in calls.get(op, ())] for op in operators},
         )
@@ -277,7 +277,7 @@ def test_no_block_can_fault_the_loader(name: str, arithmetic: str, machine: str,
         (tmp_path / file).write_text(text)
     (tmp_path / "main.c").write_text(EVA.format(name=name, NAME=name.upper()))
     text = (tmp_path / f"{name}.c").read_text()
-    looping = ("fits", "float_fit", "wholes_fit", "factors_fit", "described", "fill", "bytes")
+    looping = ("fits", "floats_fit", "wholes_fit", "factors_fit", "described", "fill", "bytes")
     functions = [f"{name}_{what}" for what in looping]
     visits = ",".join(f"{function}:5000" for function in functions if f"{function}(" in text)
     done = subprocess.run(

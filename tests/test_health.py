@@ -185,20 +185,20 @@ def test_wrong_keys_are_refused(keys: str, words: str) -> None:
 @pytest.mark.slow  # minutes without compiled functions
 @pytest.mark.parametrize("colour", [0.0, 0.9])
 def test_false_alarms_of_coloured_noise_are_those_stated(colour: float) -> None:
-    """A residual of AR(1) noise, and 300 windows of more of it, each with a zero from a window of its own: the band is
+    """A residual of AR(1) noise, and 3000 windows of more of it, each with a zero from a window of its own: the band is
     an estimate from 400 000 samples, which moves the rate by a few per cent; 4 standard deviations of the count, and a
     quarter for windows of which only some tens of samples are independent, so that their sums are not quite normal."""
     p, rng = 0.05, np.random.default_rng(7)
-    noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.normal(size=400_000 + 600 * 512))
+    noise = signal.lfilter([np.sqrt(1 - colour**2)], [1, -colour], rng.normal(size=400_000 + 6000 * 512))
     found = quality.residual([noise[:400_000]], 1e-3)
     assert found is not None
     more = f"residual: {{rms: {found.rms}, correlation: {found.correlation}, samples: {found.samples}}}\n"
     text = TEXT.replace("5.0e-5", "1.0e-3") + more + f"emit: {{health: {{window: 512, false_alarms: {p}}}}}\n"
     watch = FloatWatch(Band.of(parse_parameters(text)), ARITHMETICS["float32"])
-    before, windows = np.swapaxes(noise[400_000:].reshape(300, 2, 512), 0, 1)
-    status, *_ = watch.update(np.zeros(300 * 512), (windows - before.mean(axis=1, keepdims=True)).ravel())
+    before, windows = np.swapaxes(noise[400_000:].reshape(3000, 2, 512), 0, 1)
+    status, *_ = watch.update(np.zeros(3000 * 512), (windows - before.mean(axis=1, keepdims=True)).ravel())
     count = int(np.sum(status[511::512] == MODEL_LEFT))
-    wanted = p * 300
+    wanted = p * 3000
     assert 0.5 * wanted < count < 1.25 * wanted + 4.0 * wanted**0.5
 
 

@@ -245,14 +245,14 @@ C_RUNTIME = PACKAGE.parent / "c_runtime"
 
 BOUNDS = {
     "lines of hystgen/": (70_300, 38_000),
-    "lines that ask `.fixed`": (26, 10),
+    "lines that ask `.fixed`": (18, 10),
     "lines with `Any`": (317, 300),
     "`fmt: skip`": (1, 30),
     "tuples of numbered slots": (24, 0),
     "files that name an effect outside its folder": (2, 0),
     "class names in several files": (1, 0),
-    "files of C": (98, 120),
-    "lines of C": (7_715, 5_000),
+    "files of C": (99, 120),
+    "lines of C": (7_950, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; only one that gives users
 something new raises it."""

@@ -107,8 +107,8 @@ UNITS = (
 """Also every effect by itself, in floating point and in fixed point."""
 
 
-GUARDS = ("compensator/within.c",)
-"""Functions that emission calls in the steps of a module that loads its parameters."""
+GUARDS = ("compensator/within.c", "compensator/block.c")
+"""Functions that emission calls in a module that loads its parameters: in its steps, and to read and write bytes."""
 
 
 def model(name: str) -> Model:

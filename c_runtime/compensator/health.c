@@ -27,7 +27,7 @@ unsigned int hystgen_health_update(hystgen_health_t *self, hystgen_real_t expect
     const int64_t squares = self->squares + (int64_t)part * part;
 #else
     const hystgen_real_t error = measured - expected;
-    if (!(error - error == 0)) { /* NaN or infinite */
+    if (!(error >= -HYSTGEN_REAL_MAX && error <= HYSTGEN_REAL_MAX)) { /* NaN too */
         return self->status;
     }
     const hystgen_real_t sum = self->sum + error;

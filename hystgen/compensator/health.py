@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import mpmath
 import numpy as np
@@ -105,11 +105,15 @@ def f_tail(n: float, m: float, p: float) -> float:
 
 class Watch(ABC):
     """The watch in an arithmetic. `macros`: names, without the model's prefix, and values of the constants in the C;
-    `mean_lsb`, `square_lsb`: output units per unit of the mean, and their square per unit of the mean square."""
+    `lsb`: names and values of output units per unit of the mean, and their square per unit of the mean square, where
+    these are counted; `types`: of the mean and of the mean square in C; `unequal`: how C compares two of them; `skips`:
+    whether a sample may be no number."""
 
     band: Band
-    mean_lsb = 1.0
-    square_lsb = 1.0
+    lsb: tuple[tuple[str, float], ...] = ()
+    types: ClassVar[tuple[str, str]]
+    unequal: ClassVar[str]
+    skips: ClassVar[bool]
     macros: tuple[tuple[str, int | np.floating], ...]
 
     def update(self, expected: Values, measured: Values) -> tuple[NDArray[np.uint32], Values, Values]:
@@ -137,6 +141,10 @@ class Watch(ABC):
 
 class FloatWatch(Watch):
     """In floating point. Raises FormatError if the squares underflow."""
+
+    types = ("hystgen_real_t", "hystgen_real_t")
+    unequal = "!hystgen_selftest_same({}, {})"
+    skips = True
 
     def __init__(self, band: Band, arithmetic: Arithmetic) -> None:
         self.band, self._real = band, arithmetic.real
@@ -182,17 +190,22 @@ class FixedWatch(Watch):
     without loading a constant.
     """
 
+    types = ("int32_t", "int64_t")
+    unequal = "{} != {}"
+    skips = False
+
     def __init__(self, band: Band, lsb: float, bits: int) -> None:
         self.band = band
         self._halved = int(bits > 30)
         self._bits = band.window.bit_length() - 1
         self._shift = max(0, -(-(2 * (bits + 1 - self._halved) + self._bits - 62) // 2))
-        self.mean_lsb = lsb * 2**self._halved
-        self.square_lsb = (self.mean_lsb * 2**self._shift) ** 2 / band.window
-        mean = math.ceil((band.mean + lsb) / self.mean_lsb)
+        mean_lsb = lsb * 2**self._halved
+        square_lsb = (mean_lsb * 2**self._shift) ** 2 / band.window
+        self.lsb = ("MEAN", mean_lsb), ("SQUARE", square_lsb)
+        mean = math.ceil((band.mean + lsb) / mean_lsb)
         low = max(mean.bit_length() - 8, 0)
         self._mean = -(-mean >> low) << low
-        self._square = math.ceil((band.rms + lsb) ** 2 / self.square_lsb)
+        self._square = math.ceil((band.rms + lsb) ** 2 / square_lsb)
         if self._mean >= 2**31 or self._square >= 2**62:
             raise FormatError((KEY, f"a band of {band.rms:.3g} is wider than the range of displacements; give less"))
         self.macros = (

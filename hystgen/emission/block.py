@@ -61,12 +61,14 @@ REAL = ("float", "double")
 @dataclass(frozen=True)
 class Leaf:
     """Numbers of one type among the members: a member, or one in an array of structures. `place`: the expression for
-    one of them, with an index for each of `sizes`."""
+    one of them, with an index for each of `sizes`; `described`: whether they only describe the unit, as real numbers do
+    in fixed point."""
 
     place: str
     kind: str
     sizes: tuple[int, ...]
     values: tuple[float | int, ...]
+    described: bool = False
 
     @property
     def name(self) -> str:
@@ -90,7 +92,6 @@ class UnitParameters:
     layout: str
     name: str
     sha256: str = ""
-    fixed: bool = False
 
     @cached_property
     def hash(self) -> bytes:
@@ -100,7 +101,7 @@ class UnitParameters:
     @property
     def real(self) -> str:
         """The type of real numbers that are not just descriptions."""
-        return next((leaf.kind for leaf in self.leaves if leaf.kind in REAL and not self.fixed), "")
+        return next((leaf.kind for leaf in self.leaves if leaf.kind in REAL and not leaf.described), "")
 
     @property
     def groups(self) -> list[list[Leaf]]:
@@ -334,7 +335,7 @@ def parameters(
     pieces: Iterable[Piece], code: Sequence[Piece], sha256: str, wanted: Mapping[str, int] = MappingProxyType({}),
 ) -> UnitParameters:
     """The parameters of a module with these numbers and tables; `pieces`: types; `code`: functions."""
-    types, name = _Types(one, pieces), one.names.name
+    types, name, fixed = _Types(one, pieces), one.names.name, one.family.kind == "fixed"
     lines, leaves, pointers = [], list[Leaf](), list[tuple[str, str]]()
     curves = (CURVES.fullmatch(table.name.removeprefix(f"{name}_")) for table in tables)
     counts = {
@@ -345,7 +346,7 @@ def parameters(
         meant = one.family.meaning(kind)
         shown = f"{name}_real_t" if kind == "real_t" else meant
         lines.append(f"    {shown} {member(own)};" + (f" /* {comment} */" if comment else ""))
-        leaves.append(Leaf(member(own), meant, (), (types.value(value, meant),)))
+        leaves.append(Leaf(member(own), meant, (), (types.value(value, meant),), fixed and meant in REAL))
     for table in tables:
         found = _TABLE.search(table.text)
         assert found, table.text
@@ -357,7 +358,7 @@ def parameters(
             lines.append(f"    struct {{ {inside} }} {place};")
             for (own, values), column in zip(table.columns, words, strict=True):
                 numbers = tuple(types.value(word, kind) for word in column)
-                leaves.append(Leaf(f"{place}.{own}[i]", kind, (len(values),), numbers))
+                leaves.append(Leaf(f"{place}.{own}[i]", kind, (len(values),), numbers, fixed and kind in REAL))
             continue
         lengths = tuple(map(int, re.findall(r"\d+", found[3])))
         if curve := CURVES.fullmatch(place):
@@ -375,7 +376,8 @@ def parameters(
             if "*" in meant:
                 pointers += _targets(where, meant, written, name)
             else:
-                leaves.append(Leaf(where, meant, sizes, tuple(types.value(str(word), meant) for word in written)))
+                numbers = tuple(types.value(str(word), meant) for word in written)
+                leaves.append(Leaf(where, meant, sizes, numbers, fixed and meant in REAL))
     lines.append("    uint32_t crc; /* of the block */")
     body = "\n".join(lines)
     declared = (
@@ -385,7 +387,7 @@ def parameters(
     members = [f"{leaf.kind} {leaf.place} {leaf.sizes}" for leaf in leaves]
     said = [" ".join(piece.code.split()) for piece in code]
     layout = "\n".join([*members, *map(str, pointers), *said])
-    return UnitParameters(declared, tuple(leaves), tuple(pointers), layout, name, sha256, one.family.kind == "fixed")
+    return UnitParameters(declared, tuple(leaves), tuple(pointers), layout, name, sha256)
 
 
 def _targets(where: str, kind: str, words: Sequence[object], name: str) -> Iterator[tuple[str, str]]:
@@ -438,7 +440,7 @@ def rows(made: UnitParameters) -> Iterator[tuple[Leaf, list[NumberLimits]]]:
     places = {leaf.name: leaf for leaf in made.leaves}
     targets = [(re.sub(r"\[\w*\]", "", place), target.rpartition("->")[2]) for place, target in made.pointers]
     for leaf in made.leaves:
-        if leaf.kind in REAL and made.fixed:
+        if leaf.described:
             continue
         found = [NumberLimits(*own, count, 0) for own, count in _runs(leaf, typical, places, targets)]
         member = re.split(r"[._]", leaf.name)[-1]
@@ -595,17 +597,25 @@ def loader(made: UnitParameters) -> str:
     """The C that loads a block."""
     real, whole = made.groups
     found = {leaf.place: own for leaf, own in rows(made)}
-    ranges: list[tuple[str, list[list[str]], bool]] = []
-    for kind in () if made.fixed else REAL:
-        exact = np.float32 if kind == "float" else float
-        ranges.append((kind, [
-            [literal(exact(row.least)), literal(exact(row.most)), f"{row.length}u", "0u", f"{row.rises}u"]
-            for leaf in real if leaf.kind == kind for row in found[leaf.place]
-        ], False))
-    ranges.append(("int64_t", [
+    placed = [list(map(str, each)) for each in factors(made)]
+    described = sum(len(each.values) for each in real if each.described)
+    tables = [("factor", placed, "{}, at"), *(
+        (kind, [
+            [literal(exact(row.least)), literal(exact(row.most)), f"{row.length}u", f"{row.rises}u"]
+            for leaf in real if leaf.kind == kind and not leaf.described for row in found[leaf.place]
+        ], "{}, &at")
+        for kind, exact in (("float", np.float32), ("double", float))
+    ), ("whole", [
         [*(literal(int(x)) for x in row[:2]), f"{row.length}u", str(_size(leaf)), f"{row.rises}u", literal(row.sum)]
         for leaf in whole for row in found[leaf.place]
-    ], True))
+    ], "{}, &at")]
+    ranges = [(kind, f"{kind}_range", each) for kind, each, _ in tables if each]
+    checks = [
+        f"{made.name}_{kind}s_fit({form.format(f'{made.name}_{kind}_range, {len(each)}u')})"
+        for kind, each, form in tables if each
+    ]
+    if described:  # the real numbers of a block in fixed point, which come before the whole ones
+        checks.insert(-1, f"{made.name}_described({described}u, &at)")
     fill = []
     for each in (*real, *whole):
         read = f"{made.name}_{each.kind}(&at)"
@@ -618,9 +628,7 @@ def loader(made: UnitParameters) -> str:
             lines = [f"for ({index} = 0; {index} < {size}u; ++{index}) {{", *(f"    {line}" for line in lines), "}"]
         fill += lines
     return template(
-        "parameters.c.j2", name=made.name, NAME=made.name.upper(), ranges=ranges, fill=fill, pointers=made.pointers,
-        hash=[f"0x{byte:02x}u" for byte in made.hash], version=VERSION, size=made.size, head=HEAD.size,
-        reals=[(kind, 8 * size) for kind, size in (("float", 4), ("double", 8)) if kind in {e.kind for e in real}],
-        factors=[*factors(made)], described=sum(len(each.values) for each in real) if made.fixed else 0,
-        deepest=max(len(each.sizes) for each in made.leaves),
+        "parameters.c.j2", name=made.name, NAME=made.name.upper(), ranges=ranges, checks=checks, fill=fill,
+        pointers=made.pointers, hash=[f"0x{byte:02x}u" for byte in made.hash], version=VERSION, size=made.size,
+        head=HEAD.size, deepest=max(len(each.sizes) for each in made.leaves),
     )

@@ -394,12 +394,8 @@ def _health(one: EmittedModel) -> list[Macro]:
         ("HEALTH_MEAN_BAND", literal(real(band.mean)), f"{unit}: largest mean error of a window, either sign"),
         ("HEALTH_RMS_BAND", literal(real(band.rms)), f"{unit}: largest rms error of a window"),
     ]
-    if one.family.arithmetic.fixed:
-        found += [
-            ("HEALTH_MEAN_LSB", literal(one.watch.mean_lsb), f"{unit} per unit of health_t.mean"),
-            ("HEALTH_SQUARE_LSB", literal(one.watch.square_lsb), f"({unit})^2 per unit of health_t.mean_square"),
-        ]
-    return found
+    per = {"MEAN": f"{unit} per unit of health_t.mean", "SQUARE": f"({unit})^2 per unit of health_t.mean_square"}
+    return [*found, *((f"HEALTH_{name}_LSB", literal(lsb), per[name]) for name, lsb in one.watch.lsb)]
 
 
 def watched(one: EmittedModel) -> list[str]:
@@ -616,7 +612,7 @@ def _parameter(name: str, call: str, one: EmittedModel) -> str:
         "applied": drive,
         "d": _unit("output", one),
         "measured": _unit("output", one) + "; a sample with NaN or infinity is skipped" * (
-            call == "health_update" and not one.family.arithmetic.fixed
+            call == "health_update" and one.watch is not None and one.watch.skips
         ),
         "expected": _unit("output", one) + f", {expected(one)}",
         "i": f"index of the column, one of {macros}_INFLUENCE_*; any other is ignored, and reported as limited",

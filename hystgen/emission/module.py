@@ -271,10 +271,11 @@ def implementation(one: EmittedModel, code: Code) -> str:
     if code.parameters:
         from hystgen.emission import block, snapshot
 
-        macros = "\n".join(code.macros)
-        texts = (
-            code.kernels, macros, code.operators, block.loader(code.parameters), snapshot.functions(code.snapshots)
+        own = block.loader(code.parameters), snapshot.functions(code.snapshots)
+        read = runtime.render_operators(
+            runtime.block_pieces(family, own, name), name, 0, one.names.rt, family
         )
+        texts = (code.kernels, "\n".join(code.macros), code.operators, read, *own)
     return "\n".join((interface.overview("\n".join(texts)), opening, apart, *texts, closing))
 
 
@@ -365,8 +366,8 @@ def files(module: Module) -> dict[str, str]:
     ):
         file = f"{name}_selftest{ending}"
         text = template(
-            f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows,
-            fixed=one.family.arithmetic.fixed, unread=slots.OP_UNREAD, block=bytes_,
+            f"selftest{ending}.j2", operators=operators, codes=codes, windows=windows, unread=slots.OP_UNREAD,
+            watch=one.watch, block=bytes_, unloaded=" -1 if the block of the unit in it does not load." * bool(bytes_),
         )
         text = text.replace("hystgen", name).replace("HYSTGEN", one.names.NAME)  # samples contain neither
         found[file] = f"{top(file, about, more)}\n{text}"

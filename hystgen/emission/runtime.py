@@ -578,6 +578,12 @@ def guards(variant: Variant) -> str:
     return chosen(_read("compensator/within.c"), variant.family.facts | variant.facts)
 
 
+def block_pieces(family: Family, texts: Iterable[str], name: str) -> list[Piece]:
+    """The functions for blocks and snapshots that the texts of the module `name` use."""
+    words = {word for text in texts for word in re.findall(rf"\b{name}_(\w+)", text)}
+    return needed(_pieces(["compensator/block.c"], family.facts), sorted(f"hystgen_{word}" for word in words))
+
+
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
     """The kernel pieces that `pieces` need but a shared run time keeps private."""
     shared = {piece.name for piece in _pieces(family.kernels, family.facts)}

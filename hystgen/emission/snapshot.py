@@ -241,11 +241,6 @@ class InstanceState:
         return max(len(each.sizes) for each in self.entries)
 
     @property
-    def arrays(self) -> bool:
-        """Whether there are arrays."""
-        return self.deepest > 0
-
-    @property
     def put(self) -> list[str]:
         """The lines that append the state."""
         return [line for each in self.entries for line in each.put(self.name)]
@@ -395,6 +390,4 @@ def instances(one: EmittedModel, types: Iterable[Piece]) -> list[InstanceState]:
 def functions(found: Sequence[InstanceState]) -> str:
     """The C that writes and reads states."""
     name = found[0].name
-    kinds = {entry.kind for each in found for entry in each.entries}
-    reals = [(kind, bits) for kind, bits in (("float", 32), ("double", 64)) if kind in kinds]
-    return template("snapshot.c.j2", name=name, NAME=name.upper(), instances=found, reals=reals)
+    return template("snapshot.c.j2", name=name, NAME=name.upper(), instances=found)

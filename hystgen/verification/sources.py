@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
 from hystgen.basics import writing
@@ -16,6 +17,9 @@ from hystgen.emission.chain import settings
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.health import Watch
 
 CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
 @dataclass(frozen=True)
@@ -52,17 +56,16 @@ def harness(
     arithmetic: Arithmetic = FLOAT32,
     coded: bool = False,
     columns: int = 0,
-    watched: bool = False,
+    watch: Watch | None = None,
     block: Sequence[str] = (),
 ) -> str:
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: further calls of this model, by operator;
-    `coded`: whether the inverse steps from code to code; `columns`: number of those that are set; `watched`: whether
-    the error of the model is watched; `block`: bytes of its parameters, if it loads them."""
+    `coded`: whether the inverse steps from code to code; `columns`: number of those that are set; `watch`: of the
+    model's error; `block`: bytes of its parameters, if it loads them."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic, columns)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
-        chain=chain, coded=coded, watched=watched, block=block,
-        means=("int32_t", "int64_t") if arithmetic.fixed else (f"{name}_real_t",) * 2,
+        chain=chain, coded=coded, watch=watch, block=block,
     )
 
 
@@ -93,13 +96,13 @@ def write(folder: Path, model: Model, options: Options, parameters: str = "") ->
     name = model.name
     emitted = module.of(model, options, parameters)
     texts, calls, coded = module.files(emitted), emitted.compensator.calls, emitted.compensator.variant.coded
-    watched = emitted.compensator.variant.watched
+    watch = emitted.compensator.watch
     sha256 = {file: hashlib.sha256(text.encode("ascii")).hexdigest() for file, text in texts.items()}
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
     arithmetic, words = ARITHMETICS[options.arithmetic], block.words(emitted.parameters)
     columns = len(emitted.compensator.columns)
-    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, columns, watched, words)
+    texts["hystgen_harness.c"] = harness(name, options.operators, calls, arithmetic, coded, columns, watch, words)
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded, watched)
+    return Sources(name, options.operators, tuple(paths.values()), caller, selftest, sha256, coded, watch is not None)
