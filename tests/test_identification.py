@@ -617,7 +617,7 @@ class TestWritten:
         assert code == 0, err
         assert out.splitlines()[-1] == str(target)
         content = written(target)
-        assert list(content) == ["hystgen", "name", "units", "recorded_at", "input_range", "model", "residual"]
+        assert list(content) == ["hystgen", "name", "units", "recorded_at", "input_range", "residual", "model"]
         assert content["name"] == "axis_1"
         assert content["units"] == {"input": "V", "output": "um"}
         assert list(content["model"]) == ["pi", "output_offset"]
