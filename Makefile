@@ -9,6 +9,9 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
+# Processes of tests; each takes up to 1 GB
+PROCESSES := $(shell n=$$(nproc 2>/dev/null || echo 2); [ $$n -gt 8 ] && n=8; echo $$n)
+
 # Modules are compiled once, not by each of the hundred or so processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -53,16 +56,17 @@ firmware: $(VENV)/ready
 
 # Every feature once, without tests marked thorough; each file in one process, which compiles its functions once
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile -m "not thorough"
 
-# Everything CI runs; each file in one process too, whose tests share what they compute
+# Everything CI runs: each feature, and one in five of the thorough tests; HYSTGEN_WHOLE=1 runs all. Each file in one
+# process too, whose tests share what they compute
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist worksteal --share 5
 
 # All proofs by Frama-C, which has to be installed; `make check` does a fifth of them
 prove: $(VENV)/ready
-	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
+	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n $(PROCESSES) tests/test_proof.py
 
 lint: $(VENV)/ready
 	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime docs
@@ -70,7 +74,7 @@ lint: $(VENV)/ready
 
 # Ten modules, five minutes each
 fuzz: $(VENV)/ready
-	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
+	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n $(PROCESSES) tests/test_fuzz.py -k nothing
 
 # Ten times as many random models as in `make check`, against an exact model; build/oracle keeps those with faults
 check-bounds: $(VENV)/ready

@@ -6,6 +6,8 @@ import contextlib
 import gc
 import os
 import shutil
+import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,7 @@ WHOLE = bool(os.environ.get("HYSTGEN_WHOLE"))
 
 NO_DATA = f"marked data, and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another"
 SHORTENED = "marked slow; HYSTGEN_WHOLE=1 runs all"
+SHARED = "marked thorough, and beyond the share of --share; HYSTGEN_WHOLE=1 runs all"
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
 GARBAGE = 50_000, 20, 20
@@ -90,9 +93,13 @@ def brief(request: pytest.FixtureRequest) -> Iterator[bool]:
         yield briefly
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--share", type=int, default=1, metavar="N", help="run one in N of the tests marked thorough")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     gc.set_threshold(*GARBAGE)
-    config.stash[LEFT_OUT] = {NO_DATA: 0, SHORTENED: 0}
+    config.stash[LEFT_OUT] = {NO_DATA: 0, SHORTENED: 0, SHARED: 0}
     if os.environ.get("HYSTGEN_REQUIRE_DATA") and not MEASURED.is_dir():
         raise pytest.UsageError(f"HYSTGEN_REQUIRE_DATA is set, but there is no folder {MEASURED}; set HYSTGEN_DATA")
 
@@ -107,12 +114,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         cases = thorough.kwargs.get("but_one_in") if thorough is not None else None
         if cases is not None and place(item) % cases == 0:
             item.own_markers = [each for each in item.own_markers if each != thorough]
+    share = 1 if WHOLE else config.option.share
     for reason, runs in (
         (NO_DATA, lambda item: MEASURED.is_dir() or item.get_closest_marker("data") is None),
         (SHORTENED, lambda item: WHOLE or in_short_form(item)),
+        (SHARED, in_share(share)),
     ):
-        left_out = [item for item in items if not runs(item)]
-        items[:] = [item for item in items if runs(item)]
+        found = [(item, runs(item)) for item in items]
+        items[:] = [item for item, kept in found if kept]
+        left_out = [item for item, kept in found if not kept]
         config.hook.pytest_deselected(items=left_out)
         config.stash[LEFT_OUT][reason] = len(left_out)
 
@@ -129,6 +139,23 @@ def in_short_form(item: pytest.Item) -> bool:
     if slow is None:
         return True
     return "one_in" in slow.kwargs and place(item) % slow.kwargs["one_in"] == 0
+
+
+def in_share(share: int) -> Callable[[pytest.Item], bool]:
+    """Whether a thorough test belongs to one in `share` of them, asked of all tests in order: of the cases of a test
+    every so manieth, beginning where the checksum of its name says. One marked `thorough(each_time=True)` always does.
+    """
+    cases = Counter[str]()
+
+    def runs(item: pytest.Item) -> bool:
+        thorough = item.get_closest_marker("thorough")
+        if thorough is None or thorough.kwargs.get("each_time"):
+            return True
+        name = item.nodeid.partition("[")[0].rpartition("/")[2]
+        cases[name] += 1
+        return (cases[name] + zlib.crc32(name.encode())) % share == 0
+
+    return runs
 
 
 def place(item: pytest.Item) -> int:

@@ -268,7 +268,7 @@ int main(void) {{
 """
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize(("name", "arithmetic"), [("plain", "q31"), ("creeping", "q15"), ("plain", "float32")])

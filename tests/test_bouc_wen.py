@@ -344,6 +344,7 @@ def model(name: str, *effects: str, front: str = "") -> Model:
 
 
 @pytest.mark.slow(one_in=3)
+@pytest.mark.thorough(but_one_in=9)
 @pytest.mark.parametrize("more", [0, 2])
 @pytest.mark.parametrize("name", COMBINED)
 def test_the_c_gives_the_bits_of_the_reference(name: str, more: int) -> None:
@@ -401,6 +402,7 @@ def test_both_operators_follow_the_model(effect: str, arithmetic: str) -> None:
 
 
 @pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("effect", [TWO, TILTED])
 def test_a_dithered_rest_gathers_no_error(effect: str, arithmetic: str) -> None:

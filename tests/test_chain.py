@@ -75,7 +75,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 
 
 @pytest.mark.slow(one_in=8)
-@pytest.mark.thorough(but_one_in=8)
+@pytest.mark.thorough(but_one_in=24)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:

@@ -135,7 +135,7 @@ def uploaded(system: str, repository: Path) -> dict[str, ElementTree.Element]:
     return {path.name: ElementTree.parse(path).getroot() for path in paths}
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_both_systems_pass_and_keep_what_was_compiled(repository: Path) -> None:
     """The second one finds all compiled functions of the first one in the folder that both keep."""
     for path in (repository / "models" / "plain.yaml", *(repository / "firmware").glob("plain*")):  # one will do
@@ -240,7 +240,7 @@ def test_the_manifest_and_the_configuration_are_valid(tmp_path: Path) -> None:
     call("pre-commit", "validate-manifest", wrong, folder=tmp_path, code=1)
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_a_commit_stops_at_c_that_is_out_of_date(
     repository: Path, hooked: Callable[..., subprocess.CompletedProcess[str]]
 ) -> None:

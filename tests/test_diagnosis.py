@@ -220,6 +220,7 @@ def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.data
+@pytest.mark.thorough
 def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     """With the start-up transient in both records, a delay explains as much as the lag, so both are named."""
     sine = measured / "p885_sine_1hz.csv"
@@ -645,6 +646,7 @@ def test_a_drift_is_not_explained_by_free_start_states(tmp_path: Path) -> None:
     assert [effect["name"] for effect in content["effects"]] == ["drift"]
 
 
+@pytest.mark.thorough
 def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> None:
     """Only one record has steps faster than the amplifier. If it is held out, no parameter is fitted to them."""
     slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]

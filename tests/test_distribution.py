@@ -363,7 +363,7 @@ def header_number(header: str, macro: str) -> float:
     return float(re.findall(rf"#define {macro} (\S+)", header)[0])
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_the_same_model_gives_the_same_bytes_in_any_folder(
     built: tuple[Path, Library], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -578,7 +578,7 @@ def test_a_model_may_be_called_like_the_parts_of_a_binary(name: str, tmp_path: P
     assert stepped(library, name, "forward", "double", x).tolist() == wanted.tolist()
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_many_plays_fit_every_stack(tmp_path: Path) -> None:
     """An instance of 4096 plays takes 66 kB; Windows cannot link functions with more than a page of locals here."""
     text = FILES["density"].replace("n: 40", "n: 4096") + SAMPLED

@@ -281,7 +281,7 @@ LONG = {
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=pytest.mark.thorough if name in LONG else ())
+        pytest.param(name, marks=pytest.mark.thorough(each_time=True) if name in LONG else ())
         for name, path in PAGES.items()
         if blocks(path.read_text(encoding="utf-8"))
     ],
@@ -371,7 +371,7 @@ def broken(*pages: Path) -> list[str]:
     return sorted(f"{Path(page).name}: {link['url']}" for page, links in found["error_map"].items() for link in links)
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_links_of_the_site_lead_somewhere(site: Path) -> None:
     assert broken(site) == []
     pages = {path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md")}
@@ -392,7 +392,7 @@ def test_a_broken_link_is_noticed(tmp_path: Path) -> None:
     assert broken(tmp_path) == places
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
     for path in site.rglob("*.html"):
         text = path.read_text(encoding="utf-8")
@@ -400,7 +400,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
         assert [link for pair in loaded for link in pair if re.match("(?:https?:)?//", link)] == [], path.name
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_the_references_are_of_the_program(site: Path) -> None:
     """Each generated page contains some of the program's names."""
     for page, words in {
@@ -417,7 +417,7 @@ def test_the_references_are_of_the_program(site: Path) -> None:
         assert [word for word in words if word not in text] == [], page
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @pytest.mark.parametrize("width", [390, 1280])
 def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, chromium: str, tmp_path: Path) -> None:
     """In a browser, no page is wider than its window, every picture is drawn, and the console shows no error."""

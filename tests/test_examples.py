@@ -77,7 +77,7 @@ def story(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, example("examples/from_gap_to_firmware", "-o", folder)
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_from_a_gap_to_firmware(story: tuple[Path, str]) -> None:
     """The figures of the pages, and the files that the demo names."""
     folder, said = story
@@ -90,7 +90,7 @@ def test_from_a_gap_to_firmware(story: tuple[Path, str]) -> None:
     assert {path.name for path in (folder / "firmware").iterdir()} >= {"plain.c", "extended.c"}
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_a_raster_through_the_compiled_c(story: tuple[Path, str]) -> None:
     """The figures of docs/howto/trajectory.md; its trajectories are what `simulate` takes."""
     folder, _ = story

@@ -29,7 +29,7 @@ def make(folder: Path, *targets: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_the_image_tracks_on_every_core(firmware: Path) -> None:
     done = make(firmware)
     assert done.returncode == 0, done.stdout
@@ -42,7 +42,7 @@ def test_the_image_tracks_on_every_core(firmware: Path) -> None:
     assert rows[:3] == rows[3:6] == rows[6:]  # float32, q15 and q31, to a nanometre
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 def test_another_core_by_the_line_of_the_page(firmware: Path) -> None:
     """The command of the page, in the copied folder."""
     page = (EXAMPLE.parent.parent / "docs" / "howto" / "firmware.md").read_text()
@@ -52,7 +52,7 @@ def test_another_core_by_the_line_of_the_page(firmware: Path) -> None:
     assert "float32 with -mcpu=cortex-m7" in done.stdout
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @pytest.mark.parametrize(("old", "new", "said"), [
     ("dac(drive));", "dac(drive * 9 / 10));", "do not help as they should"),
     ("    ++sample;\n", "    for (volatile int i = 0; i < 30000; ++i) {\n    }\n    ++sample;\n", "longer than its"),

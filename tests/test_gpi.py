@@ -211,6 +211,7 @@ class TestTanh:
         assert report.ok, report.table()
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize(("volts", "metres"), [(436.9, 1e-6), (1e6, 1e-9), (1e-6, 1e6)])
 @pytest.mark.parametrize(("front", "kind"), [(bent, "gpi-deadzone"), (branched, "gpi-tanh")])
 def test_units_do_not_matter(front: Callable[[Array], Array], kind: str, volts: float, metres: float) -> None:

@@ -219,7 +219,7 @@ def test_the_package_itself_imports_nothing() -> None:
 # Walks
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @pytest.mark.parametrize(
     ("walk", "most"),
     [

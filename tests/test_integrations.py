@@ -361,7 +361,7 @@ def test_cmake_builds_tests_installs_and_is_found(emitted: Path, tmp_path: Path)
     user_of_cmake(tmp_path / "installed", found, f"-DCMAKE_PREFIX_PATH={prefix}")
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @shared
 def test_ctest_fails_with_a_fault_in_the_package(emitted: Path, tmp_path: Path) -> None:
     shutil.copytree(emitted, tmp_path / "fw")
@@ -401,7 +401,7 @@ def test_meson_builds_tests_and_installs(emitted: Path, tmp_path: Path) -> None:
 # Conan -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @shared
 def test_conan_creates_packages_and_runs_their_tests(emitted: Path, tmp_path: Path) -> None:
     home = {"CONAN_HOME": tmp_path / "home"}
@@ -569,7 +569,7 @@ mapping:
 """Schema of zephyr/module.yml, from Zephyr's documentation of modules."""
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @two_layouts
 def test_zephyr_module_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     tool("pykwalify")
@@ -602,7 +602,7 @@ def test_a_bad_kconfig_is_refused(tmp_path: Path) -> None:
         settings(tmp_path / "Kconfig")
 
 
-@pytest.mark.thorough
+@pytest.mark.thorough(each_time=True)
 @shared
 def test_espidf_component_is_valid_and_builds(emitted: Path, tmp_path: Path) -> None:
     shutil.copytree(emitted, tmp_path / "components")

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytestmark = pytest.mark.thorough
@@ -117,6 +118,27 @@ class TestThorough:
         code, text = call(tmp_path, self.TESTS, *options, HYSTGEN_DATA=str(tmp_path))
         assert code == 0, text
         assert "6 passed" in text
+
+    @ONE_PROCESS_AND_XDIST
+    def test_a_share_of_them_runs(self, options: tuple[str, ...], tmp_path: Path) -> None:
+        tests = (
+            "import pytest\n"
+            "@pytest.mark.thorough\n@pytest.mark.parametrize('k', range(12))\ndef test_cases(k):\n    pass\n"
+            "@pytest.mark.thorough(each_time=True)\n@pytest.mark.parametrize('k', [1, 2])\n"
+            "def test_each(k):\n    pass\n"
+            "def test_plain():\n    pass\n"
+            + "".join(f"@pytest.mark.thorough\ndef test_deep_{k}():\n    pass\n" for k in range(40))
+        )
+        code, text = call(tmp_path, tests, *options, "--share", "4", HYSTGEN_DATA=str(tmp_path))
+        assert code == 0, text
+        ran = set(re.findall(r"::(test_\w+(?:\[.*?\])?)", text))
+        assert {"test_each[1]", "test_each[2]", "test_plain"} <= ran
+        cases = sorted(int(each.split("[")[1][:-1]) for each in ran if "cases" in each)
+        assert np.diff(cases).tolist() == [4, 4]
+        assert 3 <= sum("deep" in each for each in ran) <= 20
+        assert f"{55 - len(ran)} tests deselected: marked thorough, and beyond the share of --share" in text
+        code, text = call(tmp_path, tests, *options, "--share", "4", HYSTGEN_DATA=str(tmp_path), HYSTGEN_WHOLE="1")
+        assert "55 passed" in text
 
 
 class TestProcessorTime:

@@ -587,7 +587,7 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
     assert {1, 2, 4, 8, 16} <= set(found)
 
 
-@pytest.mark.slow(one_in=9)
+@pytest.mark.slow(one_in=15)
 @pytest.mark.parametrize(
     ("core", "n", "arithmetic", "operator"),
     [
