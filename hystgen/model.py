@@ -229,9 +229,10 @@ class Model:
 
     def engine(
         self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None,
-        optimize: str | None = None,
+        optimize: str | None = None, loads: bool = False,
     ) -> str:
-        """'corners' or 'loop': the given engine, else the parameter file's; `auto` picks the better for `optimize`."""
+        """'corners' or 'loop': the given engine, else the parameter file's; `auto` picks the better for `optimize`.
+        `loads`: whether the C loads its parameters at run time."""
         emit = self.parameters.emit
         if self.effects:
             own = [
@@ -248,7 +249,7 @@ class Model:
                 return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
         return engines.choose(
-            engine or emit.engine, optimize or emit.optimize, self.cascade, *about, effects=bool(self.effects)
+            engine or emit.engine, optimize or emit.optimize, self.cascade, *about, bool(self.effects), loads
         )
 
     def tables(

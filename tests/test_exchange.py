@@ -16,7 +16,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import exchange, reference
 from hystgen.emission import module
-from hystgen.emission.calls import emit_options
+from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays.slots import OP_COMMIT, OP_INIT, OP_STEP
@@ -97,6 +97,22 @@ class Repeated:
                 self.t, self.state, np.array([which], np.uint8), np.array([x]).astype(dtype), answer, status
             )
         return answer[0]
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("name", ["plain", "bent", "creeping"])
+def test_an_inverse_that_loads_its_parameters_can_exchange_them(name: str, arithmetic: str) -> None:
+    """By default: only `optimize: speed` selects the engine that cannot."""
+    model, declared = units(name)[0], f"{name}_inverse_exchange("
+    if not ARITHMETICS[arithmetic].fixed:
+        sizes = {"drive_lsb": None, "output_lsb": None}
+        emit = model.parameters.emit.model_copy(update=sizes)
+        model = Model(model.parameters.model_copy(update={"emit": emit}))
+    with warnings.catch_warnings(action="ignore"):
+        made = emitted_files(model, operator="both", arithmetic=arithmetic, tables="runtime")
+        fast = emitted_files(model, operator="both", arithmetic=arithmetic, tables="runtime", optimize="speed")
+    assert declared in made[f"{name}.h"]
+    assert declared not in fast[f"{name}.h"]
 
 
 @pytest.mark.slow(one_in=6)

@@ -27,16 +27,19 @@ SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
 
 
 def choose(
-    engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool = False
+    engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool = False,
+    loads: bool = False,
 ) -> str:
     """The engine that `auto` stands for; an explicit choice is kept, but a model without plays always gets `loop`.
-    `effects`: whether the model has any; effects must not move or bend plays.
+    `effects`: whether the model has any; effects must not move or bend plays. `loads`: whether the C loads its
+    parameters at run time.
 
     `optimize` speed: fewer instructions, as a geometric mean over both cores; size: less code on both cores; auto: the
     smaller sum of the fractions of a small controller's flash and time, which breaks even at `FLASH / CYCLES`, 6.8
     bytes of code per instruction and sample. Instructions of both operators add up. With effects in fixed point only
     `speed` can select `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is
-    promised 128. Raises ValueError for any other value.
+    promised 128. The same holds for an inverse that loads its parameters, which only `loop` can exchange while it runs.
+    Raises ValueError for any other value.
     """
     for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
         if value not in known:
@@ -45,7 +48,8 @@ def choose(
         return "loop"
     if engine != "auto":
         return engine
-    if effects and optimize != "speed" and ARITHMETICS[arithmetic].fixed:
+    exchanges = loads and operator != "forward"
+    if optimize != "speed" and (exchanges or (effects and ARITHMETICS[arithmetic].fixed)):
         return "loop"
     costs = {each: _cost(each, optimize, cascade, operator, arithmetic, effects) for each in ENGINES}
     return "corners" if costs["corners"] < costs["loop"] else "loop"

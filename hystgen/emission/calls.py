@@ -69,7 +69,7 @@ def emit_options(
     model.need_compensated(arithmetic, operator)
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
-    engine = model.engine(engine, operator, arithmetic, optimize)
+    engine = model.engine(engine, operator, arithmetic, optimize, tables == "runtime")
     return Options(operator, arithmetic, engine, layout, left_out, manifest, health, tools, tables)
 
 
