@@ -159,5 +159,5 @@ SERVICE = "sample_time: 1.0e-3\nemit: {health: {window: 64, band: 0.5}, degauss:
 SERVED = {
     name: head(name, -6, 5) + PLAYS + rest + SERVICE
     for name, rest in (("served", ""), ("served_bent", TANH))
-}
-"""Models whose error is watched and whose memory can be erased."""
+} | {"served_moved": CHAINS["dashpot"] + "emit: {health: {window: 64, band: 0.5}}\n"}
+"""Models whose error is watched and whose memory can be erased, and one whose plays an effect moves."""

@@ -76,6 +76,7 @@ ANALYSED = (
     ("served", "q31", "loop"),
     ("served_bent", "float32", "corners"),
     ("served_bent", "q15", "corners"),
+    ("served_moved", "q31", "loop"),
 )
 """Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
 of `UNITS` has it there."""

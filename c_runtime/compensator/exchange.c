@@ -19,7 +19,8 @@ HYSTGEN_APART void hystgen_inverse_copy(hystgen_inverse_t *self, const hystgen_i
 }
 
 /* Takes other parameters, which emission adds as an argument. Play 0 is then at the input for the
-   last drive, and each other play as near to where it was as the one before it allows. */
+   last drive, and each other play as near to where it was as the one before it allows; plays that
+   an effect moves or bends come to rest there. */
 HYSTGEN_APART void hystgen_inverse_carry(hystgen_inverse_t *self) {
     unsigned int i;
     self->play[0] = hystgen_inverse_arrive(self, self->drive);
@@ -31,7 +32,14 @@ HYSTGEN_APART void hystgen_inverse_carry(hystgen_inverse_t *self) {
         const hystgen_reach_t upper = self->play[i] > high ? high : self->play[i];
         self->play[i] = (hystgen_play_t)(upper < low ? low : upper);
     }
+#ifdef HYSTGEN_HAS_MOVED_PLAYS
+    const bool moving = self->moving;
+    self->moving = false; /* the plays, but no other block */
     self->level = hystgen_inverse_started(self);
+    self->moving = moving;
+#else
+    self->level = hystgen_inverse_started(self);
+#endif
     self->repeated = false;
 }
 

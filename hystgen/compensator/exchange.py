@@ -5,10 +5,13 @@ from __future__ import annotations
 import copy
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.plays.slots import OP_EXPECTED
+from hystgen.plays import loop
+from hystgen.plays.slots import OP_CARRY, OP_EXPECTED
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
@@ -21,7 +24,8 @@ def exchange(old: AnyTables, new: AnyTables, state: Any) -> tuple[Any, Any]:
     expects now, and the memory (of the same kind as `state`, which is left alone) to go on with if they are taken.
 
     Both are of engine loop. Each play stays as near to where it is as the one before it allows, beginning with play 0,
-    which is at the input for the last drive; states of effects go on. In fixed point, the sizes of codes are equal.
+    which is at the input for the last drive, and comes to rest there if an effect moves or bends it; states of other
+    effects go on. In fixed point, the sizes of codes are equal.
     """
     with jit.plain():
         taken = copy.deepcopy(state)
@@ -43,18 +47,13 @@ def exchange(old: AnyTables, new: AnyTables, state: Any) -> tuple[Any, Any]:
 
 def carried(t: AnyTables, state: Any) -> Any:
     """The memory of an inverse, carried over to the plays of other tables."""
-    plays, s = _tables(t), _plays(t, state)
-    play, r = s.play, plays.threshold
-    play[0] = reference.front(t).front_forward(plays, s.step.drive[0], s.step.ascending[0])
-    for i in range(1, len(play)):
-        room = r[i] - r[i - 1]
-        play[i] = max(play[i - 1] - room, min(play[i - 1] + room, play[i]))
-    s.step.repeated[0] = 0
+    step = _plays(t, state).step
+    if isinstance(t, Tables | FixedTables):
+        loop.project(t, state, reference.front(t).front_forward(t, step.drive[0], step.ascending[0]))
+    else:
+        _called(t, state, OP_CARRY)
+    step.repeated[0] = 0
     return state
-
-
-def _tables(t: AnyTables) -> Any:
-    return t if isinstance(t, Tables | FixedTables) else t.plays
 
 
 def _plays(t: AnyTables, state: Any) -> Any:
@@ -75,9 +74,12 @@ def _expected(t: AnyTables, state: Any) -> Any:
         shown = copy.deepcopy(state)
         reference.operations(t, True).visit(t, shown, shown.step.drive[0])
         return shown.step.last[0]
-    import numpy as np
+    return _called(t, copy.deepcopy(state), OP_EXPECTED)
 
+
+def _called(t: ChainTables, state: Any, which: int) -> Any:
+    """The answer of a call that only models with effects have."""
     answer, status = np.zeros(1, t.threshold.dtype), np.zeros(1, np.uint8)
-    call = np.array([OP_EXPECTED], np.uint8)
-    reference.operations(t, True).run(t, copy.deepcopy(state), call, np.zeros(1, t.threshold.dtype), answer, status)
+    call = np.array([which], np.uint8)
+    reference.operations(t, True).run(t, state, call, np.zeros(1, t.threshold.dtype), answer, status)
     return answer[0]

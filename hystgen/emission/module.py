@@ -65,8 +65,7 @@ def compensator(model: Model, options: Options) -> EmittedModel:
         erasing = degauss.of(model, options.arithmetic)
         variant = dataclasses.replace(variant, erases=True)
         numbers = degauss.with_sequence(numbers, erasing, writer)
-    plain = variant.moves in ("", "play") and not variant.bent and not variant.elements
-    if options.tables == "runtime" and options.inverse and loop and plain:
+    if options.tables == "runtime" and options.inverse and loop and not variant.elements:
         variant = dataclasses.replace(variant, exchanges=True)
     if compiled:
         glue = chain.glue(variant, blocks, form, behind, model.cascade.pi.n)

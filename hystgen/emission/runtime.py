@@ -312,7 +312,7 @@ class Variant:
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waiting, "PREVIEW": self.taps,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
-            "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play",
+            "DASHPOT_PLAYS": self.moves == "dashpot", "PLAIN_PLAYS": self.moves == "play", "MOVED_PLAYS": self.moves,
             "BENT_PLAYS": self.bent, "BUMP": self.bends == "centre", "ELEMENTS": self.elements,
             "TILT": self.tilted, "LATE_COLUMN": self.late_column,
             "MOVES_APART": self.bent and self.moves in self.family.moves_apart,

@@ -67,6 +67,19 @@ def loop_start(s: State, start: Reals) -> None:
 
 
 @jit
+def project(t: PlayTables, s: State, w: Scalar) -> None:
+    """Set play 0 to w and move each other play as little as the one before it allows."""
+    r = t.threshold
+    s.play[0] = w
+    for i in range(1, len(r)):
+        room = r[i] - r[i - 1]
+        low = s.play[i - 1] - room
+        high = s.play[i - 1] + room
+        upper = high if s.play[i] > high else s.play[i]
+        s.play[i] = low if upper < low else upper
+
+
+@jit
 def loop_absorb(t: PlayTables, s: State, w: Scalar) -> None:
     """play_r[w] = max(w - r, min(w + r, play)), play by play."""
     for i in range(len(s.play)):

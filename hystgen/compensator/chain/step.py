@@ -23,13 +23,14 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.part import Verbs
 from hystgen.effects.plays import FixedMovingTables, FixedSearchState, SearchState
 from hystgen.plays import loop
-from hystgen.plays.loop import State, loop_output
+from hystgen.plays.loop import State, loop_output, project
 from hystgen.plays.slots import (
     CORNERS,
     DOMAIN,
     HELD,
     INPUT_CLAMPED,
     LIMITED_SETTING,
+    OP_CARRY,
     OP_CORRECT,
     OP_EXPECTED,
     OP_GAIN,
@@ -629,6 +630,12 @@ def made_of(
             correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
+        elif call == OP_CARRY:
+            project(t.plays, s.plays, arrive(t.plays, s.plays, s.plays.step.drive[0]))
+            moving = s.own.moving[0]
+            s.own.moving[0] = 0  # the plays, but no other block
+            s.plays.step.level[0] = started(t, s)
+            s.own.moving[0] = moving
         elif call >= OP_INFLUENCE:
             set_column(t, s, call - OP_INFLUENCE, x)
         return t.limits.zero[0]
