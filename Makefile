@@ -58,11 +58,11 @@ firmware: $(VENV)/ready
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadfile -m "not thorough"
 
-# Everything CI runs: each feature, and one in five of the thorough tests; HYSTGEN_WHOLE=1 runs all. Each file in one
+# Everything CI runs: each feature, and one in eight of the thorough tests; HYSTGEN_WHOLE=1 runs all. Each file in one
 # process too, whose tests share what they compute
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist worksteal --share 5
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist worksteal --share 8
 
 # All proofs by Frama-C, which has to be installed; `make check` does a fifth of them
 prove: $(VENV)/ready

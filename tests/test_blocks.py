@@ -232,7 +232,8 @@ def fuzzed(name: str, arithmetic: str, folder: Path, blocks: int, seed: int = 1)
 FUZZED = [
     ("plain", "float32"), ("plain", "q31"), ("plain", "q15"), ("plain", "float64"), ("listed", "float32"),
     ("listed", "q31"), ("creeping", "q31"), ("creeping", "float32"), ("warm", "q15"), ("bent", "float32"),
-    ("quick", "float32"), ("linear", "q31"),
+    ("quick", "float32"), ("linear", "q31"), ("creeping", "q15"), ("logarithmic", "q15"), ("lagging", "q15"),
+    ("quick", "q15"), ("worn", "q31"), ("worn", "q15"),
 ]
 """Modules whose blocks are damaged."""
 

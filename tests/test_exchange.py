@@ -69,8 +69,9 @@ class Exchanging:
             f"{real} {name}_inverse_step(void *, {real}); void {name}_inverse_commit(void *, {real});"
             f"{real} {name}_inverse_exchange(void *, void *, bool);"
         )
+        self.library = self.ffi.dlopen(str(library))  # its functions do not keep it open
         self.c = {
-            call: getattr(self.ffi.dlopen(str(library)), f"{name}_{call}")
+            call: getattr(self.library, f"{name}_{call}")
             for call in ("load", "inverse_init", "inverse_step", "inverse_commit", "inverse_exchange")
         }
         self.self, self.units = self.ffi.new("long long[]", ROOM), []

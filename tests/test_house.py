@@ -252,7 +252,7 @@ BOUNDS = {
     "files that name an effect outside its folder": (2, 0),
     "class names in several files": (1, 0),
     "files of C": (99, 120),
-    "lines of C": (7_950, 5_000),
+    "lines of C": (7_960, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; only one that gives users
 something new raises it."""

@@ -93,9 +93,9 @@ static uint32_t hystgen_crc(const unsigned char *at, size_t size) {
 }
 
 /* Limits of `count` whole numbers of `size` bytes, in the order of a block. `rises`: 1 if they
-   rise, 255 if they are above the number before, or from 2 on, how many coefficients each of
-   several polynomials has: only the first has these limits, and `sum` limits the others together.
- */
+   rise, 255 if they are above the number before, 254 if `sum` limits all of them together, or from
+   2 on, how many coefficients each of several polynomials has: only the first has these limits, and
+   `sum` limits the others together. */
 typedef struct {
     int64_t least;
     int64_t most;
@@ -112,7 +112,7 @@ static bool hystgen_wholes_fit(const hystgen_whole_range_t *range, unsigned int 
     unsigned int row;
     for (row = 0; row < rows; ++row) {
         const unsigned int rises = range[row].rises;
-        const unsigned int each = rises > 1u && rises != 255u ? rises : 1u;
+        const unsigned int each = rises > 1u && rises < 254u ? rises : 1u;
         int64_t sum = 0;
         unsigned int i;
         for (i = 0; i < range[row].count; ++i) {
@@ -123,7 +123,7 @@ static bool hystgen_wholes_fit(const hystgen_whole_range_t *range, unsigned int 
             if (((rises == 1u && i > 0) || rises == 255u) && x < before) {
                 return false;
             }
-            sum = i % each > 0 ? sum + (x < 0 ? -x : x) : 0;
+            sum = i % each > 0 || rises == 254u ? sum + (x < 0 ? -x : x) : 0;
             if (sum > range[row].sum) {
                 return false;
             }
@@ -206,27 +206,39 @@ static bool hystgen_described(unsigned int count, const unsigned char **at) {
     return true;
 }
 
-/* Where `count` factors lie in a block, mantissas from 2^30 on and shifts, and the largest one. */
+/* Where `count` factors lie in a block, mantissas from 2^30 on and shifts, the largest one, and the
+   largest sum of their sizes, at the same shift. */
 typedef struct {
     uint32_t mantissa;
     uint32_t shift;
     uint32_t count;
     int32_t most;
     uint8_t most_shift;
+    int64_t sum;
 } hystgen_factor_range_t;
 
-/* Whether no factor is larger than its limit. */
+/* Whether no factor is larger than its limit, nor are all of them together. */
 static bool hystgen_factors_fit(const hystgen_factor_range_t *range, unsigned int rows,
                                 const unsigned char *at) {
     unsigned int row;
     for (row = 0; row < rows; ++row) {
         const unsigned char *mantissa = &at[range[row].mantissa];
         const unsigned char *shift = &at[range[row].shift];
+        int64_t sum = 0;
         unsigned int i;
         for (i = 0; i < range[row].count; ++i) {
             const int64_t x = hystgen_whole(&mantissa, -4);
+            const int64_t size = x < 0 ? -x : x;
             const int64_t below = range[row].most_shift - hystgen_whole(&shift, 1);
-            if (below >= 0 && (x < 0 ? -x : x) > (below < 32 ? range[row].most >> below : 0)) {
+            if (below >= 0 && size > (below < 32 ? range[row].most >> below : 0)) {
+                return false;
+            }
+            if (below >= 0) { /* at most 31, or the factor is 0 */
+                sum += size == 0 ? 0 : size << below;
+            } else {
+                sum += below > -63 ? size >> -below : 0;
+            }
+            if (sum > range[row].sum) {
                 return false;
             }
         }
