@@ -244,7 +244,7 @@ def test_walks_stay_short(walk: str, most: int) -> None:
 C_RUNTIME = PACKAGE.parent / "c_runtime"
 
 BOUNDS = {
-    "lines of hystgen/": (70_300, 38_000),
+    "lines of hystgen/": (70_350, 38_000),
     "lines that ask `.fixed`": (18, 10),
     "lines with `Any`": (317, 300),
     "`fmt: skip`": (1, 30),
@@ -252,7 +252,7 @@ BOUNDS = {
     "files that name an effect outside its folder": (2, 0),
     "class names in several files": (1, 0),
     "files of C": (99, 120),
-    "lines of C": (7_960, 5_000),
+    "lines of C": (7_980, 5_000),
 }
 """Bound of each count today, and the target. A change that gets below the bound lowers it; only one that gives users
 something new raises it."""

@@ -17,10 +17,10 @@ TANH, DEAD_ZONE = 0, 1
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 2, 4, 8, 16, 32
 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
-# further calls of models with effects
-OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
-OP_CARRY = 13
-"""Of an inverse that has got other tables: its memory is carried over to their plays."""
+# further calls of models with effects; the last, of an inverse with other tables: carry the memory over to their plays
+OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED, OP_CARRY = (
+    range(4, 14)
+)
 # the first of the calls that set a column, and their largest number
 OP_INFLUENCE = 64
 MOST_COLUMNS = 64
