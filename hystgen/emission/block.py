@@ -435,8 +435,10 @@ class NumberLimits(NamedTuple):
     sum: int = 0
 
 
-ABOVE, TOGETHER = 255, 254
-"""`rises` of the upper end of a range, which comes right after the lower one, and of numbers whose sum has a limit."""
+ABOVE = 255
+"""`rises` of the upper end of a range, which comes right after the lower one."""
+TOGETHER = 254
+"""`rises` of numbers whose sum has a limit."""
 
 
 def exact(x: float | int) -> NumberLimits:
