@@ -16,7 +16,7 @@ import jinja2
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from modelfiles import CHAINS, CODED, FILES, INVERSE_ALONE, PLAYS
+from modelfiles import CHAINS, CODED, FILES, INVERSE_ALONE, PLAYS, chain
 from test_proof import MACHINES, frama_c
 
 import hystgen
@@ -311,6 +311,15 @@ def test_command_line(tmp_path: Path) -> None:
     assert (shown["name"], shown["damage"], shown["numbers"]["drive_max"]) == ("plain", "", [4.0])
     said("blob", tmp_path / "a.yaml", tmp_path / "b.yaml", "-o", tmp_path / "fleet", "--module", header)
     assert sorted(path.name for path in (tmp_path / "fleet").iterdir()) == ["a.bin", "b.bin"]
+    far = chain("far", "name: creep, time_constants: [0.1], weights: [0.02]")
+    for name, text in (("d", far), ("e", far.replace("[0.02]", "[0.021]")), ("f", far.replace("[0.02]", "[0.04]"))):
+        (tmp_path / f"{name}.yaml").write_text(text)
+    said("emit", tmp_path / "d.yaml", "-o", tmp_path, "--tables", "runtime", "--arithmetic", "q31", "-q")
+    said("blob", tmp_path / "e.yaml", "-o", unit, "--module", tmp_path / "far.h")
+    told = said("blob", tmp_path / "f.yaml", "-o", tmp_path / "f.bin", "--module", tmp_path / "far.h", code=2)
+    assert "takes no such numbers: creep_1_term." in told
+    assert not (tmp_path / "f.bin").exists()
+    unit.write_bytes(hystgen.blob(str(tmp_path / "b.yaml"), arithmetic="float32"))
     assert "is only here" in said("blob", tmp_path / "c.yaml", "-o", unit, "--module", header, code=2)
     unit.write_bytes(unit.read_bytes()[:-1])
     assert "size: " in said("blob", "--show", unit, code=1)

@@ -113,6 +113,13 @@ class UnitParameters:
         """Bytes of a block."""
         return HEAD.size + sum(len(leaf.stored) for leaf in self.leaves) + 4
 
+    def placed(self) -> Iterator[tuple[Leaf, int]]:
+        """Each leaf and where its first number is among those of a block."""
+        at = 0
+        for leaf in itertools.chain.from_iterable(self.groups):
+            yield leaf, at
+            at += len(leaf.stored)
+
     def block(self) -> bytes:
         """The block with these numbers."""
         numbers = b"".join(leaf.stored for group in self.groups for leaf in group)
@@ -419,8 +426,10 @@ COMPARED = re.compile(r"(?:.*\.)?(?:hold|last|begin)")
 unit's numbers. Of 12 units of `worn` whose numbers differ by 5 %, the factor 1.25 left out 7."""
 STATES = re.compile(r"state_\w+")
 """Limits of states, which contain a format: a power of two that grows by one where a unit's number passes another."""
-FORMAT = ("lift", "drop")
+FORMAT = ("lift", "drop", "bits")
 """[bits] Formats of a fixed-point block, which may be one bit finer or coarser than those of the module's own unit."""
+SCALED = re.compile(r"\w+_term\.late\.mantissa")
+"""Factors that contain such a format, and so may be twice as large."""
 
 
 class NumberLimits(NamedTuple):
@@ -591,19 +600,17 @@ class FactorPlace(NamedTuple):
 
 def factors(made: UnitParameters) -> Iterator[FactorPlace]:
     """The limits of all factors in fixed point, which have a mantissa and a shift."""
-    places, at = {}, 0
-    for leaf in (leaf for group in made.groups for leaf in group):
-        places[leaf.name] = at, leaf
-        at += len(leaf.stored)
+    places = {leaf.name: (at, leaf) for leaf, at in made.placed()}
     for name, (begin, leaf) in places.items():
         if name.endswith(".mantissa"):
             shifts_at, shifts = places[f"{name.removesuffix('mantissa')}shift"]
             sizes = [Fraction(abs(int(m)), 1 << int(s)) for m, s in zip(leaf.values, shifts.values, strict=True)]
-            largest = max(sizes) * Fraction(WIDER[False]) or Fraction(1, 1 << SHIFTS[0])
+            wider = Fraction(WIDER[False]) * (2 if SCALED.fullmatch(name) else 1)
+            largest = max(sizes) * wider or Fraction(1, 1 << SHIFTS[0])
             shift = 0
             while largest * (1 << shift) < 1 << 30:
                 shift += 1
-            most, every = (int(x * (1 << shift)) for x in (largest, max(largest, sum(sizes) * Fraction(WIDER[False]))))
+            most, every = (int(x * (1 << shift)) for x in (largest, max(largest, sum(sizes) * wider)))
             yield FactorPlace(begin, shifts_at, len(leaf.values), min(most, 2**31 - 1), shift, every)
 
 
@@ -618,14 +625,32 @@ def fits(leaf: Leaf, found: Sequence[NumberLimits], values: Sequence[float | int
     for row in found:
         own = values[at : at + row.length]
         at += row.length
-        if row.rises == TOGETHER and sum(map(abs, own)) > row.sum:
-            return False
-        rises = 0 if row.rises in (ABOVE, TOGETHER) else row.rises
-        rising = rises != 1 or all(b >= a for a, b in itertools.pairwise(own))
-        inside = all(row.least <= x <= row.most for x in own[:: max(rises, 1)])
-        if not rising or not inside or (rises > 1 and max(_beyond_first(own, rises)) > row.sum):
+        if outside(row, own):
             return False
     return leaf.kind not in REAL or all(map(math.isfinite, values))
+
+
+def outside(row: NumberLimits, own: Sequence[float | int]) -> str:
+    """What is wrong with the numbers of a row; empty if nothing is."""
+    each = 1 if row.rises in (ABOVE, TOGETHER) else max(row.rises, 1)
+    for x in own[::each]:
+        if not row.least <= x <= row.most:
+            return f"{x:.6g}, from {row.least:.6g} to {row.most:.6g}"
+    if row.rises == 1 and any(b < a for a, b in itertools.pairwise(own)):
+        return "numbers that have to rise and do not"
+    together = sum(map(abs, own)) if row.rises == TOGETHER else max(_beyond_first(own, each)) if each > 1 else 0
+    return f"together {together:.6g}, at most {row.sum:.6g}" if together > row.sum else ""
+
+
+def factors_outside(row: FactorPlace, numbers: bytes) -> str:
+    """What is wrong with the factors of a row in the numbers of a block; empty if nothing is."""
+    mantissas = struct.unpack_from(f"<{row.length}i", numbers, row.mantissa)
+    shifts = numbers[row.shift : row.shift + row.length]
+    sizes = [Fraction(abs(m), 1 << s) for m, s in zip(mantissas, shifts, strict=True)]
+    for found, most in ((max(sizes), row.most), (sum(sizes), row.sum)):
+        if found > Fraction(most, 1 << row.most_shift):
+            return f"{float(found):.6g}, at most {most / 2**row.most_shift:.6g}"
+    return ""
 
 
 def _size(leaf: Leaf) -> int:

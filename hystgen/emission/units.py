@@ -57,17 +57,26 @@ def _outside(made: UnitParameters, text: str, source: Path) -> str:
     for real, group in zip((True, False), made.groups, strict=True):
         numbers = [(leaf.name, x) for leaf in group for x in leaf.values]
         kind = made.real if real else "whole"
-        found = re.search(rf"\w+_{kind}_range\[\d+\] = \{{(.*?)\n\}};", text, re.DOTALL)
         at = 0
-        for row in re.findall(r"\{([^{}]*)\}", found[1]) if found else ():
-            words = row.split(",")
+        for words in _rows(text, kind):
             least, most = (block.value(word, kind) for word in words[:2])
-            count = block.read(words[2])
-            for name, x in numbers[at : at + int(count)]:
-                if not least <= x <= most:
-                    return f"{name} = {x:.6g}, from {least:.6g} to {most:.6g}"
-            at += int(count)
+            count, rises = int(block.read(words[2])), int(block.read(words[3 if real else 4]))
+            row = block.NumberLimits(least, most, count, rises, 0 if real else int(block.read(words[5])))
+            if wrong := block.outside(row, [x for _, x in numbers[at : at + count]]):
+                return f"{numbers[at][0]} = {wrong}"
+            at += count
+    places = {at: leaf.name for leaf, at in made.placed()}
+    for words in _rows(text, "factor"):
+        factors = block.FactorPlace(*map(block.read, words))
+        if wrong := block.factors_outside(factors, made.block()[block.HEAD.size :]):
+            return f"{places[factors.mantissa].removesuffix('.mantissa')} = {wrong}"
     return ""
+
+
+def _rows(text: str, kind: str) -> list[list[str]]:
+    """The words of each row of limits of a kind in a module."""
+    found = re.search(rf"\w+_{kind}_range\[\d+\] = \{{(.*?)\n\}};", text, re.DOTALL)
+    return [row.split(",") for row in re.findall(r"\{([^{}]*)\}", found[1])] if found else []
 
 
 def _room(text: str) -> dict[str, int]:
