@@ -23,9 +23,10 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
 SECONDS = 1e-3
-"""[s] Sample time."""
+"""[s] Sample time. Chosen; no other was tried, and the watch counts samples, not seconds."""
 SAMPLES = 12000
-"""[samples] Length of a session: four windows beside the one that gives the zero of the sensor."""
+"""[samples] Length of a session: the next round number that holds five windows, of which the first gives the zero of
+the sensor and four are judged."""
 WINDOW = 2048
 """[samples] A window with about 100 independent means of the most coloured noise (0.9: 19 samples each)."""
 PROBABILITIES = (0.1, 0.01, 1e-3)
