@@ -143,7 +143,7 @@ def in_short_form(item: pytest.Item) -> bool:
 
 def in_share(share: int) -> Callable[[pytest.Item], bool]:
     """Whether a thorough test belongs to one in `share` of them, asked of all tests in order: of the cases of a test
-    every so manieth, beginning where the checksum of its name says. One marked `thorough(each_time=True)` always does.
+    every n-th, beginning where the checksum of its name says. One marked `thorough(each_time=True)` always does.
     """
     cases = Counter[str]()
 
